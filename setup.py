@@ -1,7 +1,7 @@
 """Builds the wheel of the package kbvh: CMake builds and installs it, setuptools packs what was installed.
 
 KBVH_PYTHON_BUILD   the build folder, such as build/python; a module that is built there is packed as it is
-KBVH_CMAKE          further arguments of cmake for a new build folder, such as -DKBVH_COUNTING_ONLY=OFF
+KBVH_CMAKE          further arguments of cmake for a new build folder, such as -DKBVH_UNITY=OFF
 """
 
 import os
@@ -25,7 +25,7 @@ class CMakeBuild(build_ext):
         build = Path(given or Path(self.build_temp) / "cmake").resolve()
         jobs = os.environ.get("CMAKE_BUILD_PARALLEL_LEVEL") or str(os.cpu_count() or 1)
         if not (build / "CMakeCache.txt").exists():
-            options = ["-DCMAKE_BUILD_TYPE=Release", "-DKBVH_PYTHON=ON", "-DKBVH_COUNTING_ONLY=ON", "-DKBVH_UNITY=ON"]
+            options = ["-DCMAKE_BUILD_TYPE=Release", "-DKBVH_PYTHON=ON", "-DKBVH_UNITY=ON"]
             options += ["-DKBVH_BUILD_TESTS=OFF", f"-DKBVH_PYTHON_EXECUTABLE={sys.executable}"]
             options += shlex.split(os.environ.get("KBVH_CMAKE", ""))
             subprocess.run(["cmake", "-S", SOURCE, "-B", build, *options], check=True)

@@ -54,13 +54,12 @@ AuditView breadth_first(Handle root, const Primitive& primitive, const Children&
 }
 
 /// The shared part: which bodies move, and the check that time does not run backwards.
-template <class Count>
-class Contestant : public CountedStrategy<float, Count>, public TakesPlanChanges<float> {
+class Contestant : public CountedStrategy<float>, public TakesPlanChanges<float> {
  public:
   static constexpr Foresight foresight = Foresight::none;
 
   Contestant(const SceneView<float>& scene, const SampledMotion<float>& motion)
-      : CountedStrategy<float, Count>(scene, motion),
+      : CountedStrategy<float>(scene, motion),
         near_bodies_(scene.pairs(), scene.body_count()),
         moves_(scene.body_count()) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body)

@@ -46,14 +46,14 @@ class BoxHits final : public btNodeOverlapCallback {
   }
 };
 
-template <class S, class Count>
-class BulletBvh final : public Contestant<Count> {
+template <class S>
+class BulletBvh final : public Contestant {
   static_assert(std::is_same_v<S, float>);
 
  public:
   BulletBvh(const SceneView<float>& scene, const SampledMotion<float>& motion, Topologies /*none*/,
             const Params& params)
-      : Contestant<Count>(scene, motion),
+      : Contestant(scene, motion),
         scaled_(params.word("scale") == "fit"),
         trees_(params.word("query") == "trees"),
         bodies_(scene.body_count()) {

@@ -32,16 +32,14 @@ class LeafHits final : public btDbvt::ICollide {
   }
 };
 
-template <class S, class Count>
-class BulletDbvt final : public Contestant<Count> {
+template <class S>
+class BulletDbvt final : public Contestant {
   static_assert(std::is_same_v<S, float>);
 
  public:
   BulletDbvt(const SceneView<float>& scene, const SampledMotion<float>& motion, Topologies /*none*/,
              const Params& params)
-      : Contestant<Count>(scene, motion),
-        refits_(params.word("update") == "refit"),
-        bodies_(scene.body_count()) {
+      : Contestant(scene, motion), refits_(params.word("update") == "refit"), bodies_(scene.body_count()) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
       build(body);
       copy_built(body);

@@ -52,15 +52,13 @@ struct CgalTraits {
   static int dimension() { return 3; }
 };
 
-template <class S, class Count>
-class CgalBoxes final : public CountedStrategy<S, Count>,
-                        public AnswersSelfPairs,
-                        public TakesPlanChanges<S> {
+template <class S>
+class CgalBoxes final : public CountedStrategy<S>, public AnswersSelfPairs, public TakesPlanChanges<S> {
  public:
   static constexpr Foresight foresight = Foresight::none;
   CgalBoxes(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies /*none*/,
             const Params& params)
-      : CountedStrategy<S, Count>(scene, motion),
+      : CountedStrategy<S>(scene, motion),
         cutoff_(std::ptrdiff_t(params.number("cutoff"))),
         bodies_(scene.body_count()),
         near_bodies_(scene.pairs(), scene.body_count()) {}

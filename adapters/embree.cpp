@@ -66,10 +66,8 @@
 namespace kbvh {
 namespace {
 
-template <class S, class Count>
-class EmbreeRefit final : public CountedStrategy<S, Count>,
-                          public AnswersRays<S>,
-                          public TakesPlanChanges<S> {
+template <class S>
+class EmbreeRefit final : public CountedStrategy<S>, public AnswersRays<S>, public TakesPlanChanges<S> {
   static_assert(std::is_same_v<S, float>);
 
  public:
@@ -77,7 +75,7 @@ class EmbreeRefit final : public CountedStrategy<S, Count>,
 
   EmbreeRefit(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies /*none*/,
               const Params& params)
-      : CountedStrategy<S, Count>(scene, motion),
+      : CountedStrategy<S>(scene, motion),
         refits_(params.word("geometry") == "triangles" ? Refits::triangles : Refits::boxes),
         layout_(params.word("layout") == "compact" ? SceneLayout::compact : SceneLayout::usual),
         threads_(threads_of(params)),

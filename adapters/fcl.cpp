@@ -92,8 +92,8 @@ class LeafCollector final : public fcl::detail::MeshCollisionTraversalNode<Bound
   }
 };
 
-template <class Own, template <class> class Bounds, Mode mode, Verdict verdict, class S, class Count>
-class Fcl final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
+template <class Own, template <class> class Bounds, Mode mode, Verdict verdict, class S>
+class Fcl final : public CountedStrategy<S>, public TakesPlanChanges<S> {
   static_assert(sizeof(Own) >= sizeof(S), "rounding positions would lose pairs");
   static constexpr bool boxes = std::is_same_v<Bounds<Own>, fcl::AABB<Own>>;
   using Model = fcl::BVHModel<Bounds<Own>>;
@@ -105,7 +105,7 @@ class Fcl final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
 
   Fcl(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies /*none*/,
       const Params& /*params*/)
-      : CountedStrategy<S, Count>(scene, motion),
+      : CountedStrategy<S>(scene, motion),
         bodies_(scene.body_count()),
         near_bodies_(scene.pairs(), scene.body_count()) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
@@ -231,12 +231,12 @@ class Fcl final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
     };
     node->primitives_a = primitives_of(pair.first);
     node->primitives_b = primitives_of(pair.second);
-    node->enable_statistics = Count::enabled;
     return node;
   }
   void collide(Collector& node, PairBuffer& out) {
     const auto begin = std::ptrdiff_t(out.size());
     node.out = &out;
+    node.enable_statistics = !this->is_timed();
     node.num_bv_tests = 0;
     fcl::detail::collide<Own>(&node);
     if (node.primitives_a != nullptr || node.primitives_b != nullptr) {
@@ -291,14 +291,12 @@ class Fcl final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
     check(model.beginReplaceModel(), body);
     for_each_vertex(body, [&](const Vector& p) { model.replaceVertex(p); });
     check(model.endReplaceModel(mode != Mode::rebuild, mode == Mode::bottom_up), body);
-    if constexpr (Count::enabled) {
-      // A rebuild reads everything below a node to fit its box, to find its mean, and to divide it.
-      const auto nodes = std::uint64_t(model.getNumBVs());
-      if (mode == Mode::rebuild) state.fitted_vertices = 3 * vertices_below_nodes(model);
-      this->count_.add(Counter::nodes_visited, nodes);
-      this->count_.add(Counter::values_written, (boxes ? 6 : 18) * nodes);
-      this->count_.add(Counter::vertex_reads, state.fitted_vertices);
-    }
+    const auto nodes = std::uint64_t(model.getNumBVs());
+    // A rebuild reads everything below a node to fit its box, to find its mean, and to divide it.
+    if (mode == Mode::rebuild && !this->is_timed()) state.fitted_vertices = 3 * vertices_below_nodes(model);
+    this->count_.add(Counter::nodes_visited, nodes);
+    this->count_.add(Counter::values_written, (boxes ? 6 : 18) * nodes);
+    this->count_.add(Counter::vertex_reads, state.fitted_vertices);
   }
 
   static std::uint64_t vertices_below_nodes(const Model& model) {
@@ -349,8 +347,8 @@ class Fcl final : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
 
 template <class Own, template <class> class Bounds, Mode mode, Verdict verdict>
 struct Bind {
-  template <class S, class Count>
-  using Type = Fcl<Own, Bounds, mode, verdict, S, Count>;
+  template <class S>
+  using Type = Fcl<Own, Bounds, mode, verdict, S>;
 };
 
 /// Performs FCL's own test of a vertex and a face, or of two edges, in linear motion: it finds the cubic's

@@ -43,9 +43,8 @@ const std::vector<Candidate>& candidates() {
   return list;
 }
 
-/// Counts nothing itself: its counters are those of its instances, with the triangle tests of silent ones, so
-/// it is no CountedStrategy.
-template <class S, class Count>
+/// Counts nothing itself: its counters are those of its instances, so it is no CountedStrategy.
+template <class S>
 class Auto final : public Strategy<S>,
                    public AnswersChanges<S>,
                    public AnswersRays<S>,
@@ -58,7 +57,6 @@ class Auto final : public Strategy<S>,
         motion_(motion),
         steps_(scene, motion, topologies),
         gain_(params.number("gain")) {
-    constexpr auto policy = Count::enabled ? CountingPolicy::counting : CountingPolicy::silent;
     for (const Candidate& candidate : candidates()) {
       const auto found = std::find_if(registry().begin(), registry().end(), [&](const StrategyEntry& entry) {
         return entry.info.id == candidate.id;
@@ -66,7 +64,7 @@ class Auto final : public Strategy<S>,
       if (found == registry().end() || !found->info.can.plan_changes || !found->info.can.rays) continue;
       const Params own(found->info.id, found->info.parameters, candidate.params);
       runners_.push_back({&candidate, found->info.positions == PositionUse::all,
-                          NestedStrategies<S>::create(*found, scene, motion, topologies, own, policy)});
+                          NestedStrategies<S>::create(*found, scene, motion, topologies, own)});
       Runner& runner = runners_.back();
       runner.work = dynamic_cast<TellsWork*>(runner.strategy.get());
     }
@@ -216,6 +214,10 @@ class Auto final : public Strategy<S>,
     return text + last_seen(seen_);
   }
 
+  void be_timed() override {
+    for (Runner& runner : runners_) runner.strategy->be_timed();
+  }
+
   std::size_t bytes() const override {
     std::size_t total = touching_.capacity() * sizeof(PrimitivePair) +
                         changed_.capacity() * sizeof(PlanChange<S>) + changes_of_many_.bytes() +
@@ -229,7 +231,7 @@ class Auto final : public Strategy<S>,
   Counters counted() const override {
     Counters table = retired_;
     for (const Runner& runner : runners_) add(table, runner.strategy->counters());
-    if constexpr (Count::enabled) table[Counter::positions_fetched] = this->sampled_.fetched() - first_fetch_;
+    table[Counter::positions_fetched] = this->sampled_.fetched() - first_fetch_;
     return table;
   }
 

@@ -21,9 +21,9 @@
 namespace kbvh {
 namespace {
 
-template <class S, class Count>
-class AverageCase final : public StoredHierarchyStrategy<S, Count> {
-  using Base = StoredHierarchyStrategy<S, Count>;
+template <class S>
+class AverageCase final : public StoredHierarchyStrategy<S> {
+  using Base = StoredHierarchyStrategy<S>;
   using Entry = typename ProbablePairs<S>::Entry;
 
  public:

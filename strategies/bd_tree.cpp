@@ -17,16 +17,16 @@
 namespace kbvh {
 namespace {
 
-template <class S, class Count>
-class BdTree final : public BlendedStrategy<S, Count> {
+template <class S>
+class BdTree final : public BlendedStrategy<S> {
  public:
   BdTree(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies, const Params& params)
-      : BlendedStrategy<S, Count>(scene, motion, std::move(topologies)),
+      : BlendedStrategy<S>(scene, motion, std::move(topologies)),
         most_modes_(std::uint32_t(params.number("modes"))),
         tolerance_(params.number("tolerance")) {}
   void reset_to(double t) override {
     choice_.clear();
-    BlendedStrategy<S, Count>::reset_to(t);
+    BlendedStrategy<S>::reset_to(t);
   }
   std::string choice() const override { return choice_; }
 

@@ -12,8 +12,8 @@ template <class S>
 struct BinnedSahBuilder : BinnedBuilder<S> {
   explicit BinnedSahBuilder(const Params& params) : BinnedBuilder<S>(std::uint32_t(params.number("grain"))) {}
 };
-template <class S, class Count>
-using BinnedSah = BuiltStrategy<S, Count, BinnedSahBuilder<S>>;
+template <class S>
+using BinnedSah = BuiltStrategy<S, BinnedSahBuilder<S>>;
 
 }  // namespace
 }  // namespace kbvh

@@ -21,12 +21,12 @@ std::vector<std::string> kernel_words() {
   return words;
 }
 
-template <class S, class Count>
-class BottomUp final : public StoredHierarchyStrategy<S, Count>,
+template <class S>
+class BottomUp final : public StoredHierarchyStrategy<S>,
                        public AnswersSelfPairs,
                        public AnswersSweeps<S>,
                        public TakesGeometryChanges<S> {
-  using Base = StoredHierarchyStrategy<S, Count>;
+  using Base = StoredHierarchyStrategy<S>;
 
  public:
   static constexpr Foresight foresight = Foresight::none;

@@ -183,16 +183,16 @@ class ReducedBase : public Base {
   SlabQuery<S> slabs_;
 };
 
-template <class S, class Count>
-class ReducedRefit final : public ReducedBase<S, StoredHierarchyStrategy<S, Count>>, public AnswersSelfPairs {
+template <class S>
+class ReducedRefit final : public ReducedBase<S, StoredHierarchyStrategy<S>>, public AnswersSelfPairs {
  public:
   static constexpr Foresight foresight = Foresight::none;
-  using ReducedBase<S, StoredHierarchyStrategy<S, Count>>::ReducedBase;
+  using ReducedBase<S, StoredHierarchyStrategy<S>>::ReducedBase;
 };
 
-template <class S, class Count>
-class BottomUpApproximate final : public ReducedBase<S, FixedPlansHierarchyStrategy<S, Count>> {
-  using Base = ReducedBase<S, FixedPlansHierarchyStrategy<S, Count>>;
+template <class S>
+class BottomUpApproximate final : public ReducedBase<S, FixedPlansHierarchyStrategy<S>> {
+  using Base = ReducedBase<S, FixedPlansHierarchyStrategy<S>>;
 
  public:
   static constexpr Foresight foresight = Foresight::next_keyframe;

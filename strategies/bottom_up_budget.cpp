@@ -7,9 +7,9 @@
 namespace kbvh {
 namespace {
 
-template <class S, class Count>
-class BottomUpBudget final : public StoredHierarchyStrategy<S, Count> {
-  using Base = StoredHierarchyStrategy<S, Count>;
+template <class S>
+class BottomUpBudget final : public StoredHierarchyStrategy<S> {
+  using Base = StoredHierarchyStrategy<S>;
 
  public:
   static constexpr Foresight foresight = Foresight::none;

@@ -43,17 +43,15 @@ struct PeriodTree {
   }
 };
 
-template <class S, class Count>
-class BottomUpPeriod final : public CountedStrategy<S, Count>,
-                             public AnswersRays<S>,
-                             public TakesPlanChanges<S> {
+template <class S>
+class BottomUpPeriod final : public CountedStrategy<S>, public AnswersRays<S>, public TakesPlanChanges<S> {
   using Node = PeriodNode<S>;
 
  public:
   static constexpr Foresight foresight = Foresight::none;
   BottomUpPeriod(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
                  const Params& /*params*/)
-      : CountedStrategy<S, Count>(scene, motion),
+      : CountedStrategy<S>(scene, motion),
         near_bodies_(scene.pairs(), scene.body_count()),
         topologies_(std::move(topologies)) {
     for (const Topology& topology : topologies_)
@@ -78,8 +76,9 @@ class BottomUpPeriod final : public CountedStrategy<S, Count>,
     };
     for (const std::uint32_t i : near_bodies_.find(box_of, tests)) {
       const BodyPair& pair = this->scene_.pairs()[i];
-      if (roots_[pair.first] != nullptr && roots_[pair.second] != nullptr)
-        check(*roots_[pair.first], *roots_[pair.second], pair, out);
+      if (roots_[pair.first] == nullptr || roots_[pair.second] == nullptr) continue;
+      ++tests;
+      check(*roots_[pair.first], *roots_[pair.second], pair, out);
     }
     this->count_.add(Counter::box_tests, tests);
     return {};
@@ -90,13 +89,13 @@ class BottomUpPeriod final : public CountedStrategy<S, Count>,
     const auto box_of = [&](std::uint32_t body) {
       return roots_[body] == nullptr ? Box<S>{} : roots_[body]->box;
     };
-    const std::uint64_t tests = find_hits_by_body(
+    const std::uint64_t all = find_hits_by_body(
         this->scene_, this->sampled_, query, rays, hits, ray_order_, this->ray_bodies(), box_of,
-        [&](std::uint32_t body, RaySearch<S>& search) {
+        [&](std::uint32_t body, RaySearch<S>& search, std::uint64_t& tests) {
           return follow_ray(PeriodTree<S>{roots_[body]}, search, body, this->scene_.primitives(body),
-                            this->sampled_.positions(body), ray_stack_, this->count_, this->triangle_stats_);
+                            this->sampled_.positions(body), ray_stack_, tests, this->triangle_stats_);
         });
-    this->count_.add(Counter::box_tests, tests);
+    this->count_.add(Counter::box_tests, all);
   }
 
   void follow_plans(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
@@ -141,16 +140,17 @@ class BottomUpPeriod final : public CountedStrategy<S, Count>,
 
   void update(std::uint32_t body) {
     if (roots_[body] == nullptr) return;
-    refit(*roots_[body], this->scene_.primitives(body), this->sampled_.positions(body));
+    const Primitives& primitives = this->scene_.primitives(body);
+    refit(*roots_[body], primitives, this->sampled_.positions(body));
+    this->count_.add(Counter::nodes_visited, topologies_[body].size());
+    this->count_.add(Counter::values_written, std::uint64_t(6) * topologies_[body].size());
+    this->count_.add(Counter::vertex_reads, primitives.vertices.size());
   }
 
   void refit(Node& node, const Primitives& primitives, const S* positions) {
-    this->count_.add(Counter::nodes_visited);
-    this->count_.add(Counter::values_written, 6);
     node.box = Box<S>{};
     if (node.is_leaf()) {
       for (std::uint32_t v : primitives[node.primitive]) node.box.extend(positions + std::size_t(3) * v);
-      this->count_.add(Counter::vertex_reads, primitives[node.primitive].size());
       return;
     }
     refit(*node.left, primitives, positions);
@@ -161,17 +161,19 @@ class BottomUpPeriod final : public CountedStrategy<S, Count>,
 
   /// Implements Algorithm 2 of the paper, with the missing case of a leaf against an inner node.
   void check(const Node& a, const Node& b, const BodyPair& pair, PairBuffer& out) {
-    this->count_.add(Counter::box_tests);
     if (!overlap(a.box, b.box)) return;
     if (a.is_leaf() && b.is_leaf()) {
       out.push_back({pair.first, a.primitive, pair.second, b.primitive});
     } else if (a.is_leaf()) {
+      this->count_.add(Counter::box_tests, 2);
       check(a, *b.left, pair, out);
       check(a, *b.right, pair, out);
     } else if (b.is_leaf()) {
+      this->count_.add(Counter::box_tests, 2);
       check(*a.left, b, pair, out);
       check(*a.right, b, pair, out);
     } else {
+      this->count_.add(Counter::box_tests, 4);
       check(*a.left, *b.left, pair, out);
       check(*a.left, *b.right, pair, out);
       check(*a.right, *b.left, pair, out);

@@ -25,17 +25,15 @@ struct RecursiveBody {
 };
 
 /// Both recursions are as deep as the topologies: log2 n for the median.
-template <class S, class Count>
-class BottomUpRecursive final : public CountedStrategy<S, Count>,
-                                public AnswersRays<S>,
-                                public TakesPlanChanges<S> {
+template <class S>
+class BottomUpRecursive final : public CountedStrategy<S>, public AnswersRays<S>, public TakesPlanChanges<S> {
   using Body = RecursiveBody<S>;
 
  public:
   static constexpr Foresight foresight = Foresight::none;
   BottomUpRecursive(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
                     const Params& /*params*/)
-      : CountedStrategy<S, Count>(scene, motion), near_bodies_(scene.pairs(), scene.body_count()) {
+      : CountedStrategy<S>(scene, motion), near_bodies_(scene.pairs(), scene.body_count()) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
       const std::uint32_t nodes = topologies[body].size();
       bodies_.push_back({std::move(topologies[body]), std::vector<Box<S>>(nodes), &scene.primitives(body),
@@ -62,7 +60,9 @@ class BottomUpRecursive final : public CountedStrategy<S, Count>,
     for (const std::uint32_t i : near_bodies_.find(box_of, tests)) {
       const BodyPair& pair = this->scene_.pairs()[i];
       const Body &a = bodies_[pair.first], &b = bodies_[pair.second];
-      if (!a.topology.empty() && !b.topology.empty()) check(pair, a, 0, b, 0, out);
+      if (a.topology.empty() || b.topology.empty()) continue;
+      ++tests;
+      check(pair, a, 0, b, 0, out);
     }
     this->count_.add(Counter::box_tests, tests);
     return {};
@@ -73,15 +73,15 @@ class BottomUpRecursive final : public CountedStrategy<S, Count>,
     const auto box_of = [&](std::uint32_t index) {
       return bodies_[index].topology.empty() ? Box<S>{} : bodies_[index].boxes[0];
     };
-    const std::uint64_t tests = find_hits_by_body(
+    const std::uint64_t all = find_hits_by_body(
         this->scene_, this->sampled_, query, rays, hits, ray_order_, this->ray_bodies(), box_of,
-        [&](std::uint32_t index, RaySearch<S>& search) {
+        [&](std::uint32_t index, RaySearch<S>& search, std::uint64_t& tests) {
           const Body& body = bodies_[index];
           const TopologyTree tree{body.topology, [&](std::uint32_t node) { return body.boxes[node]; }};
-          return follow_ray(tree, search, index, *body.primitives, body.positions, ray_stack_, this->count_,
+          return follow_ray(tree, search, index, *body.primitives, body.positions, ray_stack_, tests,
                             this->triangle_stats_);
         });
-    this->count_.add(Counter::box_tests, tests);
+    this->count_.add(Counter::box_tests, all);
   }
 
   void follow_plans(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
@@ -104,7 +104,12 @@ class BottomUpRecursive final : public CountedStrategy<S, Count>,
  private:
   void update(std::uint32_t body) {
     bodies_[body].positions = this->sampled_.positions(body);
-    if (!bodies_[body].topology.empty()) refit(bodies_[body], 0);
+    const Body& updated = bodies_[body];
+    if (updated.topology.empty()) return;
+    refit(bodies_[body], 0);
+    this->count_.add(Counter::nodes_visited, updated.topology.size());
+    this->count_.add(Counter::values_written, std::uint64_t(6) * updated.topology.size());
+    this->count_.add(Counter::vertex_reads, updated.primitives->vertices.size());
   }
 
   void refit(Body& body, std::uint32_t id) {
@@ -117,7 +122,6 @@ class BottomUpRecursive final : public CountedStrategy<S, Count>,
       for (std::uint32_t i = 0; i < node.count(); ++i) {
         const std::uint32_t primitive = body.topology.primitives[node.first() + i];
         for (std::uint32_t v : (*body.primitives)[primitive]) box.extend(body.positions + std::size_t(3) * v);
-        this->count_.add(Counter::vertex_reads, (*body.primitives)[primitive].size());
       }
     } else {
       for (std::uint32_t child = node.first(); child < node.first() + node.count(); ++child) {
@@ -125,23 +129,23 @@ class BottomUpRecursive final : public CountedStrategy<S, Count>,
         box.extend(body.boxes[child]);
       }
     }
-    this->count_.add(Counter::nodes_visited);
-    this->count_.add(Counter::values_written, 6);
   }
 
   /// Implements Z&W Algorithm 2 for any width, with the missing case of a leaf against an inner node.
   void check(const BodyPair& pair, const Body& a, std::uint32_t id_a, const Body& b, std::uint32_t id_b,
              PairBuffer& out) {
-    this->count_.add(Counter::box_tests);
     if (!overlap(a.boxes[id_a], b.boxes[id_b])) return;
     const TopologyNode node_a = a.topology.nodes[id_a], node_b = b.topology.nodes[id_b];
     if (node_a.is_leaf() && node_b.is_leaf()) {
       compare(pair, a, node_a, b, node_b, out);
     } else if (node_a.is_leaf()) {
+      this->count_.add(Counter::box_tests, node_b.count());
       for (std::uint32_t j = 0; j < node_b.count(); ++j) check(pair, a, id_a, b, node_b.first() + j, out);
     } else if (node_b.is_leaf()) {
+      this->count_.add(Counter::box_tests, node_a.count());
       for (std::uint32_t i = 0; i < node_a.count(); ++i) check(pair, a, node_a.first() + i, b, id_b, out);
     } else {
+      this->count_.add(Counter::box_tests, std::uint64_t(node_a.count()) * node_b.count());
       for (std::uint32_t i = 0; i < node_a.count(); ++i)
         for (std::uint32_t j = 0; j < node_b.count(); ++j)
           check(pair, a, node_a.first() + i, b, node_b.first() + j, out);
@@ -152,14 +156,12 @@ class BottomUpRecursive final : public CountedStrategy<S, Count>,
   void compare(const BodyPair& pair, const Body& a, TopologyNode leaf_a, const Body& b, TopologyNode leaf_b,
                PairBuffer& out) {
     const bool single = leaf_a.count() == 1 && leaf_b.count() == 1;
+    if (!single) this->count_.add(Counter::box_tests, std::uint64_t(leaf_a.count()) * leaf_b.count());
     for (std::uint32_t i = 0; i < leaf_a.count(); ++i)
       for (std::uint32_t j = 0; j < leaf_b.count(); ++j) {
         const std::uint32_t primitive_a = a.topology.primitives[leaf_a.first() + i];
         const std::uint32_t primitive_b = b.topology.primitives[leaf_b.first() + j];
-        if (!single) {
-          this->count_.add(Counter::box_tests);
-          if (!overlap(a.box_of(primitive_a), b.box_of(primitive_b))) continue;
-        }
+        if (!single && !overlap(a.box_of(primitive_a), b.box_of(primitive_b))) continue;
         out.push_back({pair.first, primitive_a, pair.second, primitive_b});
       }
   }

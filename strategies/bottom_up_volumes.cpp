@@ -22,10 +22,10 @@ std::size_t chosen_volume(const Params& params) {
   return std::size_t(std::find(words.begin(), words.end(), params.word("volume")) - words.begin());
 }
 
-template <class S, class Count>
+template <class S>
 class BottomUpVolumes final
-    : public VolumeStrategy<S, Count, Box<S>, Dop<S, 14>, Dop<S, 18>, Dop<S, 26>, Sphere<S>, Obb<S>> {
-  using Base = VolumeStrategy<S, Count, Box<S>, Dop<S, 14>, Dop<S, 18>, Dop<S, 26>, Sphere<S>, Obb<S>>;
+    : public VolumeStrategy<S, Box<S>, Dop<S, 14>, Dop<S, 18>, Dop<S, 26>, Sphere<S>, Obb<S>> {
+  using Base = VolumeStrategy<S, Box<S>, Dop<S, 14>, Dop<S, 18>, Dop<S, 26>, Sphere<S>, Obb<S>>;
 
  public:
   BottomUpVolumes(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,

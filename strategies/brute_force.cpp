@@ -10,8 +10,8 @@
 namespace kbvh {
 namespace {
 
-template <class S, class Count>
-class BruteForce final : public CountedStrategy<S, Count>,
+template <class S>
+class BruteForce final : public CountedStrategy<S>,
                          public AnswersSelfPairs,
                          public AnswersSweeps<S>,
                          public AnswersRays<S>,
@@ -21,7 +21,7 @@ class BruteForce final : public CountedStrategy<S, Count>,
   static constexpr Foresight foresight = Foresight::none;
   BruteForce(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies /*topologies*/,
              const Params& /*params*/)
-      : CountedStrategy<S, Count>(scene, motion), boxes_(scene.body_count()) {
+      : CountedStrategy<S>(scene, motion), boxes_(scene.body_count()) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body)
       boxes_[body].resize(scene.primitives(body).count());
   }

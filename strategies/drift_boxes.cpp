@@ -27,8 +27,8 @@
 namespace kbvh {
 namespace {
 
-template <class S, class Count, class Motion>
-class DriftStrategy : public CountedStrategy<S, Count>,
+template <class S, class Motion>
+class DriftStrategy : public CountedStrategy<S>,
                       public AnswersRays<S>,
                       public TakesPlanChanges<S>,
                       public TellsWork {
@@ -38,7 +38,7 @@ class DriftStrategy : public CountedStrategy<S, Count>,
 
  public:
   DriftStrategy(const SceneView<S>& scene, const Motion& motion, Topologies topologies, const Params& params)
-      : CountedStrategy<S, Count>(scene, motion),
+      : CountedStrategy<S>(scene, motion),
         motion_(motion),
         kernels_(active_kernel_set()),
         lists_(params.word("lists") == "never" ? Lists::never : Lists::tuned),
@@ -91,7 +91,7 @@ class DriftStrategy : public CountedStrategy<S, Count>,
     ++frames_;
     for (std::uint32_t index = 0; index < bodies_.size(); ++index) observe(index, last, t);
     listed() ? advance_listed() : advance_plain();
-    for (std::uint32_t index = 0; index < bodies_.size(); ++index) count_skipped(index);
+    count_skipped();
     rays_.moved();
   }
 
@@ -193,11 +193,16 @@ class DriftStrategy : public CountedStrategy<S, Count>,
       }
     }
   }
-  void count_skipped(std::uint32_t index) {
-    const Body& body = bodies_[index];
-    if (body.remade) return;
-    this->count_.add(Counter::nodes_skipped, hierarchies_[index].topology().size());
-    if (body.watch == Watch::nothing || (!body.near && !body.read)) this->count_.add(Counter::bodies_skipped);
+  void count_skipped() {
+    std::uint64_t nodes = 0, skipped = 0;
+    for (std::uint32_t index = 0; index < bodies_.size(); ++index) {
+      const Body& body = bodies_[index];
+      if (body.remade) continue;
+      nodes += hierarchies_[index].topology().size();
+      if (body.watch == Watch::nothing || (!body.near && !body.read)) ++skipped;
+    }
+    this->count_.add(Counter::nodes_skipped, nodes);
+    this->count_.add(Counter::bodies_skipped, skipped);
   }
 
   /// Computes the box of all current vertices.
@@ -467,24 +472,24 @@ class DriftStrategy : public CountedStrategy<S, Count>,
   std::uint64_t last_box_tests_ = 0;
 };
 
-template <class S, class Count>
-class DriftBoxes final : public DriftStrategy<S, Count, SampledMotion<S>> {
+template <class S>
+class DriftBoxes final : public DriftStrategy<S, SampledMotion<S>> {
  public:
   static constexpr Foresight foresight = Foresight::none;
-  using DriftStrategy<S, Count, SampledMotion<S>>::DriftStrategy;
+  using DriftStrategy<S, SampledMotion<S>>::DriftStrategy;
 };
 
-template <class S, class Count>
-class DriftBoxesBounded final : public DriftStrategy<S, Count, SteppedMotion<S>> {
+template <class S>
+class DriftBoxesBounded final : public DriftStrategy<S, SteppedMotion<S>> {
  public:
   static constexpr Foresight foresight = Foresight::step_bound;
-  using DriftStrategy<S, Count, SteppedMotion<S>>::DriftStrategy;
+  using DriftStrategy<S, SteppedMotion<S>>::DriftStrategy;
 };
 
 /// Believes in less motion than there is.
-template <class S, class Count>
-class DriftBoxesApproximate final : public DriftStrategy<S, Count, SteppedMotion<S>> {
-  using Base = DriftStrategy<S, Count, SteppedMotion<S>>;
+template <class S>
+class DriftBoxesApproximate final : public DriftStrategy<S, SteppedMotion<S>> {
+  using Base = DriftStrategy<S, SteppedMotion<S>>;
 
  public:
   static constexpr Foresight foresight = Foresight::step_bound;

@@ -23,9 +23,9 @@ enum class Measure : std::uint8_t {
   surface,  ///< surfaces of its boxes over that of the root
 };
 
-template <class S, class Count>
-class DriftRebuild final : public LeafStrategy<S, Count> {
-  using Base = LeafStrategy<S, Count>;
+template <class S>
+class DriftRebuild final : public LeafStrategy<S> {
+  using Base = LeafStrategy<S>;
   using Body = typename Base::Body;
 
  public:

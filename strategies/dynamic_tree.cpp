@@ -43,9 +43,9 @@ struct DynamicRays {
   }
 };
 
-template <class S, class Count>
-class Dynamic final : public BuiltEachFrame<S, Count, DynamicBody<S>>, public AnswersRays<S> {
-  using Base = BuiltEachFrame<S, Count, DynamicBody<S>>;
+template <class S>
+class Dynamic final : public BuiltEachFrame<S, DynamicBody<S>>, public AnswersRays<S> {
+  using Base = BuiltEachFrame<S, DynamicBody<S>>;
   using Base::bodies_;
   using Base::lists_;
 
@@ -92,13 +92,13 @@ class Dynamic final : public BuiltEachFrame<S, Count, DynamicBody<S>>, public An
       const DynamicTree<S>& tree = bodies_[body].tree;
       return tree.empty() ? Box<S>{} : tree.node(tree.root()).box;
     };
-    const std::uint64_t tests = find_hits_by_body(
+    const std::uint64_t all = find_hits_by_body(
         this->scene_, this->sampled_, query, rays, hits, ray_order_, this->ray_bodies(), box_of,
-        [&](std::uint32_t body, RaySearch<S>& search) {
+        [&](std::uint32_t body, RaySearch<S>& search, std::uint64_t& tests) {
           return follow_ray(DynamicRays<S>{bodies_[body].tree}, search, body, this->scene_.primitives(body),
-                            this->sampled_.positions(body), ray_stack_, this->count_, this->triangle_stats_);
+                            this->sampled_.positions(body), ray_stack_, tests, this->triangle_stats_);
         });
-    this->count_.add(Counter::box_tests, tests);
+    this->count_.add(Counter::box_tests, all);
   }
 
  private:

@@ -14,9 +14,9 @@
 namespace kbvh {
 namespace {
 
-template <class S, class Count>
-class HashGridStrategy final : public BuiltEachFrame<S, Count, GridBody<S>> {
-  using Base = BuiltEachFrame<S, Count, GridBody<S>>;
+template <class S>
+class HashGridStrategy final : public BuiltEachFrame<S, GridBody<S>> {
+  using Base = BuiltEachFrame<S, GridBody<S>>;
   using Base::bodies_;
   using Base::lists_;
 

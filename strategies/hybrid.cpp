@@ -43,13 +43,14 @@ struct LazyBody {
   Lists<VertexRun> vertices;           // unique vertices below a node, where its box is computed from them
   std::vector<std::uint32_t> reads;    // number of these vertices
   Lists<NodeRange> below;              // of each root: its descendants, children first
-  std::vector<std::uint8_t> stale;     // 1: the boxes of the node's children are not current
-  std::uint64_t boxes_above = 0, reads_above = 0;  // cost of refitting `above`
+  std::vector<std::uint32_t> boxes_below, reads_below;  // of each root: cost of refitting it with `below`
+  std::vector<std::uint8_t> stale;                      // 1: the boxes of the node's children are not current
+  std::uint64_t boxes_above = 0, reads_above = 0;       // cost of refitting `above`
 };
 
-template <class S, class Count>
-class Hybrid final : public StoredHierarchyStrategy<S, Count> {
-  using Base = StoredHierarchyStrategy<S, Count>;
+template <class S>
+class Hybrid final : public StoredHierarchyStrategy<S> {
+  using Base = StoredHierarchyStrategy<S>;
 
  public:
   static constexpr Foresight foresight = Foresight::none;
@@ -103,7 +104,7 @@ class Hybrid final : public StoredHierarchyStrategy<S, Count> {
     std::size_t total = Base::bytes();
     for (const auto& body : bodies_)
       total += (body.level.size() + body.roots.size() + body.above.size() + body.root_of.size() +
-                body.reads.size()) *
+                body.reads.size() + body.boxes_below.size() + body.reads_below.size()) *
                    sizeof(std::uint32_t) +
                body.vertices.bytes() + body.below.bytes() + body.stale.size();
     return total;
@@ -160,6 +161,14 @@ class Hybrid final : public StoredHierarchyStrategy<S, Count> {
       }
     list_vertices(index);
     list_descendants(body, nodes);
+    body.boxes_below.assign(nodes, 0);
+    body.reads_below.assign(nodes, 0);
+    for (std::uint32_t n = 0; n < nodes; ++n) {
+      const std::uint32_t root = body.root_of[n];
+      if (root == none) continue;
+      body.boxes_below[root] += arrays.nodes[n].count;
+      body.reads_below[root] += hierarchy.leaf_vertices_of(n);
+    }
   }
 
   /// Lists the vertices below each node whose box is computed from them, as runs of consecutive ones.
@@ -251,14 +260,9 @@ class Hybrid final : public StoredHierarchyStrategy<S, Count> {
     const WideArrays<S> arrays = hierarchy.arrays();
     std::uint64_t boxes = arrays.nodes[node].count, reads = hierarchy.leaf_vertices_of(node);
     if (below_ == Below::subtree) {
-      for (const NodeRange range : body.below[node]) {
-        hierarchy.refit_nodes(positions, range.begin, range.end);
-        if constexpr (Count::enabled)
-          for (std::uint32_t n = range.begin; n < range.end; ++n) {
-            boxes += arrays.nodes[n].count;
-            reads += hierarchy.leaf_vertices_of(n);
-          }
-      }
+      for (const NodeRange range : body.below[node]) hierarchy.refit_nodes(positions, range.begin, range.end);
+      boxes = body.boxes_below[node];
+      reads = body.reads_below[node];
     } else {
       const WideNode& wide = arrays.nodes[node];
       for (std::uint32_t c = 0; c < inner_count(wide); ++c) box_from_vertices(index, wide.first_child + c);

@@ -14,8 +14,8 @@ struct ImplicitTreeBuilder : ImplicitBuilder<S> {
   explicit ImplicitTreeBuilder(const Params& params)
       : ImplicitBuilder<S>(params.word("curve") == "morton" ? Curve::morton : Curve::hilbert) {}
 };
-template <class S, class Count>
-using ImplicitTree = BuiltStrategy<S, Count, ImplicitTreeBuilder<S>>;
+template <class S>
+using ImplicitTree = BuiltStrategy<S, ImplicitTreeBuilder<S>>;
 
 }  // namespace
 }  // namespace kbvh

@@ -46,9 +46,9 @@ struct InflatedBody {
   std::vector<std::uint8_t> remade;
 };
 
-template <class S, class Count>
-class InflatedLazy final : public StoredHierarchyStrategy<S, Count> {
-  using Base = StoredHierarchyStrategy<S, Count>;
+template <class S>
+class InflatedLazy final : public StoredHierarchyStrategy<S> {
+  using Base = StoredHierarchyStrategy<S>;
   using Body = InflatedBody<S>;
 
  public:

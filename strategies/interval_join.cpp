@@ -58,8 +58,8 @@ struct WorkAhead {
 
 /// With foresight of the whole clip the next segment's answer is computed during the current one, a part at
 /// each frame; otherwise at the first frame of the segment.
-template <class S, class Count, Foresight F>
-class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
+template <class S, Foresight F>
+class IntervalJoinStrategy final : public CountedStrategy<S>,
                                    public AnswersSelfPairs,
                                    public AnswersChanges<S>,
                                    public AnswersSweeps<S>,
@@ -74,7 +74,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
 
   IntervalJoinStrategy(const SceneView<S>& scene, const Motion& motion, Topologies topologies,
                        const Params& params)
-      : CountedStrategy<S, Count>(scene, motion),
+      : CountedStrategy<S>(scene, motion),
         motion_(motion),
         bounds_(scene, motion, std::move(topologies), active_kernel_set(), linear_settings(params)),
         together_(scene.pairs().size() > most_joins),
@@ -194,7 +194,6 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
     ray_boxes_are_old_ = true;
     if (plans_changed_) return;  // lines may have no end: the sweep's own ends are known only when it is over
     bounds_.enter();
-    if constexpr (Count::enabled) updates_.add_to(this->count_, bounds_);
     changes_.leave_segment(parts());
     ahead_ = {};
     joined_ = false;
@@ -223,10 +222,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
   void follow_plans(double /*t*/, std::span<const PlanChange<S>> changes) override {
     plans_changed_ = ray_boxes_are_old_ = true;
     ahead_ = {};
-    if (repairs_ && bounds_.repair(changes)) {
-      if constexpr (Count::enabled) updates_.add_to(this->count_, bounds_);
-      return;
-    }
+    if (repairs_ && bounds_.repair(changes)) return;
     bounds_.plans_changed();
     new_segment();
   }
@@ -260,7 +256,9 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
   }
 
  protected:
+  void counts_cleared() override { updates_.skip(bounds_); }
   void add_counts(Counters& table) const override {
+    updates_.add_to(table, bounds_);
     table[Counter::span_tests] += span_tests();
     for (const Joins<S>* one : {&now_, &next_})
       for (const auto& answers : one->answers) table[Counter::span_verdicts] += answers.decided();
@@ -314,7 +312,6 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
   }
 
   void new_segment() {
-    if constexpr (Count::enabled) updates_.add_to(this->count_, bounds_);
     changes_.leave_segment(parts());
     joined_ = false;
     if (bounds_.came_ahead() && ahead_.joins_begun) {
@@ -384,7 +381,6 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
       ahead_.stage = Stage::joins;
     else if (!bounds_.has_ahead())
       ahead_.stage = Stage::nothing;
-    if constexpr (Count::enabled) updates_.add_to(this->count_, bounds_);
     ahead_.done += std::clamp(wanted, 0.0, Cost::node * double(bounds_.nodes_of_segment()));
   }
   /// Brings the work on joins and answers ahead to a share of the whole; from 1 on, to its end.
@@ -445,10 +441,10 @@ class IntervalJoinStrategy final : public CountedStrategy<S, Count>,
   LinearCounts<S> updates_;
 };
 
-template <class S, class Count>
-using AtOnce = IntervalJoinStrategy<S, Count, Foresight::next_keyframe>;
-template <class S, class Count>
-using MadeAhead = IntervalJoinStrategy<S, Count, Foresight::whole_clip>;
+template <class S>
+using AtOnce = IntervalJoinStrategy<S, Foresight::next_keyframe>;
+template <class S>
+using MadeAhead = IntervalJoinStrategy<S, Foresight::whole_clip>;
 
 std::vector<Parameter> join_parameters() {
   std::vector<Parameter> list = linear_parameters();

@@ -7,10 +7,10 @@
 namespace kbvh {
 namespace {
 
-template <class S, class Count>
+template <class S>
 class Kdop final
-    : public HierarchyStrategy<S, Count, DopHierarchy<S, 14>, DopHierarchy<S, 18>, DopHierarchy<S, 26>> {
-  using Base = HierarchyStrategy<S, Count, DopHierarchy<S, 14>, DopHierarchy<S, 18>, DopHierarchy<S, 26>>;
+    : public HierarchyStrategy<S, DopHierarchy<S, 14>, DopHierarchy<S, 18>, DopHierarchy<S, 26>> {
+  using Base = HierarchyStrategy<S, DopHierarchy<S, 14>, DopHierarchy<S, 18>, DopHierarchy<S, 26>>;
 
  public:
   Kdop(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies, const Params& params)

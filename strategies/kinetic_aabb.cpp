@@ -8,17 +8,16 @@
 namespace kbvh {
 namespace {
 
-template <class S, class Count>
-using OnAnyQueue = ExactKineticAabbStrategy<S, Count, AnyQueue<S>>;
+template <class S>
+using OnAnyQueue = ExactKineticAabbStrategy<S, AnyQueue<S>>;
 
-template <class S, class Count>
-class KineticAabb final : public OnAnyQueue<S, Count> {
+template <class S>
+class KineticAabb final : public OnAnyQueue<S> {
  public:
   KineticAabb(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
               const Params& params)
-      : OnAnyQueue<S, Count>(
-            scene, motion, std::move(topologies), 0,
-            params.word("query") == "rows" ? KineticQuery::wide_rows : KineticQuery::node_pairs) {
+      : OnAnyQueue<S>(scene, motion, std::move(topologies), 0,
+                      params.word("query") == "rows" ? KineticQuery::wide_rows : KineticQuery::node_pairs) {
     this->on_forest([&](auto& forest) { forest.choose_queue(params.word("queue")); });
   }
 };

@@ -8,15 +8,15 @@
 namespace kbvh {
 namespace {
 
-template <class S, class Count>
-using Approximate = KineticAabbStrategy<S, Count, AvlEventQueue<RoundedClock<S>>>;
+template <class S>
+using Approximate = KineticAabbStrategy<S, AvlEventQueue<RoundedClock<S>>>;
 
-template <class S, class Count>
-class KineticAabbApproximate final : public Approximate<S, Count> {
+template <class S>
+class KineticAabbApproximate final : public Approximate<S> {
  public:
   KineticAabbApproximate(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
                          const Params& params)
-      : Approximate<S, Count>(scene, motion, std::move(topologies), 0, KineticQuery::wide_rows) {
+      : Approximate<S>(scene, motion, std::move(topologies), 0, KineticQuery::wide_rows) {
     this->on_forest([&](auto& forest) {
       forest.clock().choose(
           params.word("event_times") == "float" ? EventTimes::in_float : EventTimes::in_double,

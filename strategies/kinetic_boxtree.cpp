@@ -29,8 +29,8 @@ BoxTreeConstruction construction(const Params& params, LeafBoxes leaf_boxes, std
   return made;
 }
 
-template <class S, class Count>
-class KineticBox final : public CountedStrategy<S, Count>,
+template <class S>
+class KineticBox final : public CountedStrategy<S>,
                          public AnswersRays<S>,
                          public EventSource<S>,
                          public TakesPlanChanges<S>,
@@ -40,7 +40,7 @@ class KineticBox final : public CountedStrategy<S, Count>,
 
   KineticBox(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
              const Params& params)
-      : CountedStrategy<S, Count>(scene, motion),
+      : CountedStrategy<S>(scene, motion),
         forest_(scene, motion, std::move(topologies), this->count_, BoundObserver<S>{&watch_}),
         motion_(motion),
         near_bodies_(scene.pairs(), scene.body_count()),
@@ -238,7 +238,7 @@ class KineticBox final : public CountedStrategy<S, Count>,
   }
 
   BoundWatch<S> watch_;
-  KineticBoxForest<S, AnyQueue<S>, Count, BoundObserver<S>> forest_;
+  KineticBoxForest<S, AnyQueue<S>, BoundObserver<S>> forest_;
   ClipMotion<S> motion_;
   NearBodies near_bodies_;
   LeafBoxes leaf_boxes_;

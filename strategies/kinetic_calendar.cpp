@@ -9,9 +9,9 @@
 namespace kbvh {
 namespace {
 
-template <class S, class Count>
-class KineticCalendar final : public RealiserStrategy<S, Count>, public TakesPlanChanges<S> {
-  using Base = RealiserStrategy<S, Count>;
+template <class S>
+class KineticCalendar final : public RealiserStrategy<S>, public TakesPlanChanges<S> {
+  using Base = RealiserStrategy<S>;
 
  public:
   static constexpr Foresight foresight = Foresight::next_keyframe;

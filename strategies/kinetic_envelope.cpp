@@ -26,9 +26,9 @@ enum class Next : std::uint8_t {
   envelope,    ///< its envelope is being computed
 };
 
-template <class S, class Count, Foresight F>
-class Envelopes final : public RealiserStrategy<S, Count>, public TakesPlanChanges<S> {
-  using Base = RealiserStrategy<S, Count>;
+template <class S, Foresight F>
+class Envelopes final : public RealiserStrategy<S>, public TakesPlanChanges<S> {
+  using Base = RealiserStrategy<S>;
   static constexpr bool ahead = F == Foresight::whole_clip;
   static constexpr std::uint32_t slices = 64;  ///< per segment of small bodies
 
@@ -224,10 +224,10 @@ class Envelopes final : public RealiserStrategy<S, Count>, public TakesPlanChang
   std::vector<State> states_;
 };
 
-template <class S, class Count>
-using KineticEnvelope = Envelopes<S, Count, Foresight::next_keyframe>;
-template <class S, class Count>
-using KineticEnvelopeAhead = Envelopes<S, Count, Foresight::whole_clip>;
+template <class S>
+using KineticEnvelope = Envelopes<S, Foresight::next_keyframe>;
+template <class S>
+using KineticEnvelopeAhead = Envelopes<S, Foresight::whole_clip>;
 
 Info info_of(std::string id, std::string title) {
   return {

@@ -15,21 +15,19 @@ const std::vector<std::string>& volume_words() {
   return words;
 }
 
-template <class S, class Count, int K>
-using DopForest =
-    KineticForest<S, SegmentHeapQueue<S>, Count, BoundObserver<S>, KineticDop<K>::template Tree>;
+template <class S, int K>
+using DopForest = KineticForest<S, SegmentHeapQueue<S>, BoundObserver<S>, KineticDop<K>::template Tree>;
 
-template <class S, class Count>
-using OfAnyDop = ExactKineticTreeStrategy<S, Count, DopForest<S, Count, 14>, DopForest<S, Count, 18>,
-                                          DopForest<S, Count, 26>>;
+template <class S>
+using OfAnyDop = ExactKineticTreeStrategy<S, DopForest<S, 14>, DopForest<S, 18>, DopForest<S, 26>>;
 
-template <class S, class Count>
-class KineticKdop final : public OfAnyDop<S, Count> {
+template <class S>
+class KineticKdop final : public OfAnyDop<S> {
  public:
   KineticKdop(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
               const Params& params)
-      : OfAnyDop<S, Count>(scene, motion, std::move(topologies), chosen(params.word("volume")),
-                           KineticQuery::node_pairs) {}
+      : OfAnyDop<S>(scene, motion, std::move(topologies), chosen(params.word("volume")),
+                    KineticQuery::node_pairs) {}
 
  private:
   static std::size_t chosen(const std::string& word) {

@@ -16,8 +16,8 @@
 namespace kbvh {
 namespace {
 
-template <class S, class Count>
-class KineticSeparationList final : public CountedStrategy<S, Count>,
+template <class S>
+class KineticSeparationList final : public CountedStrategy<S>,
                                     public AnswersChanges<S>,
                                     public AnswersSelfPairs,
                                     public AnswersSpans<S>,
@@ -31,7 +31,7 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
 
   KineticSeparationList(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
                         const Params& params)
-      : CountedStrategy<S, Count>(scene, motion),
+      : CountedStrategy<S>(scene, motion),
         by_rows_(std::any_of(topologies.begin(), topologies.end(),
                              [](const Topology& topology) { return topology.leaf_size > 1; })),
         collision_(scene, motion, std::move(topologies), this->count_, std::stoi(params.word("look_ahead")),
@@ -75,9 +75,9 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
       const auto primitives = collision_.list().primitive_pairs(i);
       out.insert(out.end(), primitives.begin(), primitives.end());
       if (!primitives.empty()) return;
-      LeafPairs<S, Count> leaves(this->scene_, this->sampled_, pair.first,
-                                 collision_.forest().tree(pair.first).topology(), pair.second,
-                                 collision_.forest().tree(pair.second).topology(), this->count_, out);
+      LeafPairs<S> leaves(this->scene_, this->sampled_, pair.first,
+                          collision_.forest().tree(pair.first).topology(), pair.second,
+                          collision_.forest().tree(pair.second).topology(), tests, out);
       for (const auto& leaf : collision_.list().leaf_pairs(i)) leaves(leaf.a, leaf.b);
       for_leaves_with_themselves(pair, [&](std::uint32_t leaf) { leaves(leaf, leaf); });
     });
@@ -116,9 +116,9 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
       boxes.ensure(0);
       return Box<S>(boxes(0));
     };
-    const std::uint64_t tests = find_hits_by_body(
+    const std::uint64_t all = find_hits_by_body(
         this->scene_, this->sampled_, query, rays, hits, ray_order_, this->ray_bodies(), box_of,
-        [&](std::uint32_t body, RaySearch<S>& search) {
+        [&](std::uint32_t body, RaySearch<S>& search, std::uint64_t& tests) {
           const Topology& topology = forest.tree(body).topology();
           auto boxes = boxes_of(body);
           const TopologyTree tree{topology, [&](std::uint32_t node) {
@@ -126,9 +126,9 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
                                     return boxes(node);
                                   }};
           return follow_ray(tree, search, body, this->scene_.primitives(body), this->sampled_.positions(body),
-                            ray_stack_, this->count_, this->triangle_stats_);
+                            ray_stack_, tests, this->triangle_stats_);
         });
-    this->count_.add(Counter::box_tests, tests);
+    this->count_.add(Counter::box_tests, all);
   }
 
   void find_spans(double t0, double t1, SpanBuffer& out) override {
@@ -306,7 +306,7 @@ class KineticSeparationList final : public CountedStrategy<S, Count>,
   std::vector<SweptLeaves> swept_leaves_;
   mutable std::vector<std::uint32_t> open_;  ///< nodes of a traversal
   bool by_rows_;                             ///< leaves have several primitives
-  KineticCollision<S, AnyEventQueue, Count> collision_;
+  KineticCollision<S, AnyEventQueue> collision_;
   ClipMotion<S> motion_;
   bool notes_changes_;                  ///< the list's leaves are the candidates
   KineticRowsQuery<S> rows_;            ///< empty unless by_rows_

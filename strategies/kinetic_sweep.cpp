@@ -25,16 +25,14 @@
 namespace kbvh {
 namespace {
 
-template <class S, class Count>
-class KineticSweep final : public CountedStrategy<S, Count>,
-                           public AnswersSelfPairs,
-                           public TakesPlanChanges<S> {
+template <class S>
+class KineticSweep final : public CountedStrategy<S>, public AnswersSelfPairs, public TakesPlanChanges<S> {
  public:
   static constexpr Foresight foresight = Foresight::next_keyframe;
 
   KineticSweep(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies,
                const Params& params)
-      : CountedStrategy<S, Count>(scene, motion),
+      : CountedStrategy<S>(scene, motion),
         kept_(params.word("order") == "events" ? KeptBy::events : KeptBy::sorting),
         bounds_(scene, motion, std::move(topologies), active_kernel_set(), LinearSettings{}),
         stale_(scene.body_count()),
@@ -63,7 +61,6 @@ class KineticSweep final : public CountedStrategy<S, Count>,
     bounds_.start();
     started_ = false;
     begin_segment(t);
-    updates_.skip(bounds_);
   }
   void advance_to(double t) override {
     if (bounds_.advance()) {
@@ -118,10 +115,12 @@ class KineticSweep final : public CountedStrategy<S, Count>,
 
  protected:
   void counts_cleared() override {
+    updates_.skip(bounds_);
     leaf_pairs_ = starts_over_ = start_tests_ = 0;
     before_ = counts_now();
   }
   void add_counts(Counters& table) const override {
+    updates_.add_to(table, bounds_);
     const Counts now = counts_now();
     table[Counter::certificates_made] += now.certificates - before_.certificates;
     table[Counter::certificates_failed] += now.swaps - before_.swaps;
@@ -155,7 +154,6 @@ class KineticSweep final : public CountedStrategy<S, Count>,
   /// Takes the ends of the segment that contains t. Bodies that meet no other one in it take no part: they
   /// have no boxes of leaves, and no pairs.
   void begin_segment(double t) {
-    if constexpr (Count::enabled) updates_.add_to(this->count_, bounds_);
     for (std::uint32_t body = 0; body < takes_part_.size(); ++body) {
       const bool takes_part = !bounds_.side(body).apart && !bounds_.hierarchy(body).empty();
       started_ = started_ && takes_part == (takes_part_[body] != 0);

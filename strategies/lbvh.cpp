@@ -13,8 +13,8 @@ template <class S>
 struct LbvhBuilder : LinearBuilder<S> {
   explicit LbvhBuilder(const Params& /*params*/) {}
 };
-template <class S, class Count>
-using Lbvh = BuiltStrategy<S, Count, LbvhBuilder<S>>;
+template <class S>
+using Lbvh = BuiltStrategy<S, LbvhBuilder<S>>;
 
 }  // namespace
 }  // namespace kbvh

@@ -18,9 +18,9 @@ struct DriftBuilder : LinearBuilder<S> {
   explicit DriftBuilder(const Params& /*params*/) {}
 };
 
-template <class S, class Count>
-class LbvhDrift final : public BuiltStrategy<S, Count, DriftBuilder<S>> {
-  using Base = BuiltStrategy<S, Count, DriftBuilder<S>>;
+template <class S>
+class LbvhDrift final : public BuiltStrategy<S, DriftBuilder<S>> {
+  using Base = BuiltStrategy<S, DriftBuilder<S>>;
 
  public:
   LbvhDrift(const SceneView<S>& scene, const SampledMotion<S>& motion, const Topologies& topologies,

@@ -17,12 +17,12 @@
 namespace kbvh {
 namespace {
 
-template <class S, class Count>
-class LeafSlabs final : public StoredHierarchyStrategy<S, Count>,
+template <class S>
+class LeafSlabs final : public StoredHierarchyStrategy<S>,
                         public AnswersSelfPairs,
                         public AnswersSweeps<S>,
                         public TakesGeometryChanges<S> {
-  using Base = StoredHierarchyStrategy<S, Count>;
+  using Base = StoredHierarchyStrategy<S>;
 
  public:
   static constexpr Foresight foresight = Foresight::none;

@@ -38,7 +38,7 @@ class Limit : public Strategy<S> {
   }
 };
 
-template <class S, class Count>
+template <class S>
 class MovedBytes final : public Limit<S, Foresight::none> {
  public:
   MovedBytes(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies, const Params&)
@@ -95,7 +95,7 @@ class MovedBytes final : public Limit<S, Foresight::none> {
   unsigned sum_ = 0;
 };
 
-template <class S, class Count>
+template <class S>
 class PlainMotion final : public Limit<S, Foresight::whole_clip> {
  public:
   PlainMotion(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies, const Params&)

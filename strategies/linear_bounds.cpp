@@ -10,8 +10,8 @@
 namespace kbvh {
 namespace {
 
-template <class S, class Count>
-class LinearBoundsStrategy final : public CountedStrategy<S, Count>,
+template <class S>
+class LinearBoundsStrategy final : public CountedStrategy<S>,
                                    public AnswersRays<S>,
                                    public TakesPlanChanges<S> {
  public:
@@ -19,7 +19,7 @@ class LinearBoundsStrategy final : public CountedStrategy<S, Count>,
 
   LinearBoundsStrategy(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies,
                        const Params& params)
-      : CountedStrategy<S, Count>(scene, motion),
+      : CountedStrategy<S>(scene, motion),
         bounds_(scene, motion, std::move(topologies), active_kernel_set(), linear_settings(params)),
         stale_(scene.body_count()),
         updates_(scene.body_count()) {
@@ -30,11 +30,10 @@ class LinearBoundsStrategy final : public CountedStrategy<S, Count>,
   void reset_to(double /*t*/) override {
     bounds_.start();
     new_frame();
-    updates_.skip(bounds_);
   }
 
   void advance_to(double /*t*/) override {
-    if (bounds_.advance()) count_update();
+    bounds_.advance();
     new_frame();
   }
 
@@ -65,7 +64,6 @@ class LinearBoundsStrategy final : public CountedStrategy<S, Count>,
   void follow_plans(double /*t*/, std::span<const PlanChange<S>> changes) override {
     if (!bounds_.repair(changes)) bounds_.plans_changed();
     bounds_.clear_changed();
-    count_update();
     new_frame();
   }
 
@@ -78,6 +76,10 @@ class LinearBoundsStrategy final : public CountedStrategy<S, Count>,
     for (const auto& marks : stale_) total += marks.size();
     return total;
   }
+
+ protected:
+  void counts_cleared() override { updates_.skip(bounds_); }
+  void add_counts(Counters& table) const override { updates_.add_to(table, bounds_); }
 
  private:
   void new_frame() {
@@ -92,9 +94,6 @@ class LinearBoundsStrategy final : public CountedStrategy<S, Count>,
   WideMoment<S> moment(std::uint32_t body, double t) {
     return {bounds_.hierarchy(body).arrays(), bounds_.side(body).ends(), stale_[body].data(),
             bounds_.fraction(t)};
-  }
-  void count_update() {
-    if constexpr (Count::enabled) updates_.add_to(this->count_, bounds_);
   }
 
   LinearBounds<S> bounds_;

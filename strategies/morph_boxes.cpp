@@ -16,12 +16,12 @@
 namespace kbvh {
 namespace {
 
-template <class S, class Count>
-class MorphBoxes final : public BlendedStrategy<S, Count> {
+template <class S>
+class MorphBoxes final : public BlendedStrategy<S> {
  public:
   MorphBoxes(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
              const Params& /*params*/)
-      : BlendedStrategy<S, Count>(scene, motion, std::move(topologies)) {}
+      : BlendedStrategy<S>(scene, motion, std::move(topologies)) {}
 
  private:
   std::unique_ptr<BlendSource<S>> make_source(std::uint32_t /*body*/, WideHierarchy<S>& hierarchy,

@@ -16,9 +16,9 @@
 namespace kbvh {
 namespace {
 
-template <class S, class Count>
-class OrientedBoxes final : public HierarchyStrategy<S, Count, ObbHierarchy<S>> {
-  using Base = HierarchyStrategy<S, Count, ObbHierarchy<S>>;
+template <class S>
+class OrientedBoxes final : public HierarchyStrategy<S, ObbHierarchy<S>> {
+  using Base = HierarchyStrategy<S, ObbHierarchy<S>>;
 
  public:
   OrientedBoxes(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,

@@ -14,9 +14,9 @@
 namespace kbvh {
 namespace {
 
-template <class S, class Count>
-class PartialRebuild final : public LeafStrategy<S, Count> {
-  using Base = LeafStrategy<S, Count>;
+template <class S>
+class PartialRebuild final : public LeafStrategy<S> {
+  using Base = LeafStrategy<S>;
 
  public:
   static constexpr Foresight foresight = Foresight::none;

@@ -17,8 +17,8 @@ struct PlocBuilder : LocalClusterBuilder<S> {
       : LocalClusterBuilder<S>(params.word("radius") == "8" ? 8 : 16, std::uint32_t(params.number("grain"))) {
   }
 };
-template <class S, class Count>
-using Ploc = BuiltStrategy<S, Count, PlocBuilder<S>>;
+template <class S>
+using Ploc = BuiltStrategy<S, PlocBuilder<S>>;
 
 }  // namespace
 }  // namespace kbvh

@@ -22,8 +22,8 @@
 namespace kbvh {
 namespace {
 
-template <class S, class Count>
-class Reinsertion final : public CountedStrategy<S, Count>,
+template <class S>
+class Reinsertion final : public CountedStrategy<S>,
                           public AnswersSelfPairs,
                           public AnswersRays<S>,
                           public TakesPlanChanges<S>,
@@ -32,7 +32,7 @@ class Reinsertion final : public CountedStrategy<S, Count>,
   static constexpr Foresight foresight = Foresight::none;
   Reinsertion(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
               const Params& params)
-      : CountedStrategy<S, Count>(scene, motion),
+      : CountedStrategy<S>(scene, motion),
         tried_(params.number("tried")),
         growth_(S(params.number("growth"))),
         least_(S(params.number("least"))),

@@ -15,11 +15,11 @@
 namespace kbvh {
 namespace {
 
-template <class S, class Count>
-class Rotations final : public StoredHierarchyStrategy<S, Count>,
+template <class S>
+class Rotations final : public StoredHierarchyStrategy<S>,
                         public AnswersSelfPairs,
                         public TakesGeometryChanges<S> {
-  using Base = StoredHierarchyStrategy<S, Count>;
+  using Base = StoredHierarchyStrategy<S>;
 
  public:
   static constexpr Foresight foresight = Foresight::none;

@@ -14,9 +14,9 @@
 namespace kbvh {
 namespace {
 
-template <class S, class Count>
-class SelectiveRestructuring final : public LeafStrategy<S, Count> {
-  using Base = LeafStrategy<S, Count>;
+template <class S>
+class SelectiveRestructuring final : public LeafStrategy<S> {
+  using Base = LeafStrategy<S>;
 
  public:
   static constexpr Foresight foresight = Foresight::none;

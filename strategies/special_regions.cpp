@@ -17,9 +17,9 @@
 namespace kbvh {
 namespace {
 
-template <class S, class Count>
-class SpecialRegions final : public StoredHierarchyStrategy<S, Count>, public AnswersSelfPairs {
-  using Base = StoredHierarchyStrategy<S, Count>;
+template <class S>
+class SpecialRegions final : public StoredHierarchyStrategy<S>, public AnswersSelfPairs {
+  using Base = StoredHierarchyStrategy<S>;
 
  public:
   static constexpr Foresight foresight = Foresight::next_keyframe;

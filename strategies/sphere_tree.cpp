@@ -14,10 +14,10 @@
 namespace kbvh {
 namespace {
 
-template <class S, class Count>
-class SphereTree final : public HierarchyStrategy<S, Count, SphereHierarchy<S, SphereBounds::wrapped>,
+template <class S>
+class SphereTree final : public HierarchyStrategy<S, SphereHierarchy<S, SphereBounds::wrapped>,
                                                   SphereHierarchy<S, SphereBounds::layered>> {
-  using Base = HierarchyStrategy<S, Count, SphereHierarchy<S, SphereBounds::wrapped>,
+  using Base = HierarchyStrategy<S, SphereHierarchy<S, SphereBounds::wrapped>,
                                  SphereHierarchy<S, SphereBounds::layered>>;
 
  public:

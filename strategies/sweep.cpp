@@ -12,9 +12,9 @@
 namespace kbvh {
 namespace {
 
-template <class S, class Count>
-class Sweep final : public BuiltEachFrame<S, Count, SortedBoxes<S>> {
-  using Base = BuiltEachFrame<S, Count, SortedBoxes<S>>;
+template <class S>
+class Sweep final : public BuiltEachFrame<S, SortedBoxes<S>> {
+  using Base = BuiltEachFrame<S, SortedBoxes<S>>;
   using Base::bodies_;
   using Base::kernels_;
   using Base::lists_;

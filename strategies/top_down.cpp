@@ -8,19 +8,20 @@
 namespace kbvh {
 namespace {
 
-template <class S, class Count>
-class TopDown final : public StoredHierarchyStrategy<S, Count>,
+template <class S>
+class TopDown final : public StoredHierarchyStrategy<S>,
                       public AnswersSelfPairs,
                       public TakesGeometryChanges<S> {
-  using Base = StoredHierarchyStrategy<S, Count>;
+  using Base = StoredHierarchyStrategy<S>;
 
  public:
   static constexpr Foresight foresight = Foresight::none;
   TopDown(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
           const Params& params)
-      : Base(scene, motion, std::move(topologies), params) {
-    for (std::uint32_t body = 0; body < scene.body_count(); ++body)
-      ranges_.push_back(primitive_ranges(this->hierarchies_[body].topology()));
+      : Base(scene, motion, std::move(topologies), params),
+        ranges_(scene.body_count()),
+        reads_(scene.body_count()) {
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body) topology_changed(body);
   }
 
   void follow_geometry(double /*t*/, const GeometryChange<S>& change) override {
@@ -34,8 +35,14 @@ class TopDown final : public StoredHierarchyStrategy<S, Count>,
     std::uint32_t begin, end;
   };
 
-  void topology_changed(std::uint32_t body) override {
-    ranges_[body] = primitive_ranges(this->hierarchies_[body].topology());
+  void topology_changed(std::uint32_t body) final {
+    const Topology& topology = this->hierarchies_[body].topology();
+    const Primitives& primitives = this->scene_.primitives(body);
+    ranges_[body] = primitive_ranges(topology);
+    reads_[body] = 0;
+    for (const Range range : ranges_[body])
+      for (std::uint32_t i = range.begin; i < range.end; ++i)
+        reads_[body] += primitives[topology.primitives[i]].size();
   }
 
   void update(std::uint32_t body) override {
@@ -43,20 +50,17 @@ class TopDown final : public StoredHierarchyStrategy<S, Count>,
     const S* positions = this->sampled_.positions(body);
     const Primitives& primitives = this->scene_.primitives(body);
     const Topology& topology = hierarchy.topology();
-    std::uint64_t reads = 0;
     for (std::uint32_t node = 0; node < topology.size(); ++node) {
       Box<S> box;
       const Range range = ranges_[body][node];
       for (std::uint32_t i = range.begin; i < range.end; ++i) {
-        const auto vertices = primitives[topology.primitives[i]];
-        reads += vertices.size();
-        for (std::uint32_t v : vertices) box.extend(positions + std::size_t(3) * v);
+        for (std::uint32_t v : primitives[topology.primitives[i]]) box.extend(positions + std::size_t(3) * v);
       }
       hierarchy.set_box(node, box);
     }
     this->count_.add(Counter::nodes_visited, topology.size());
     this->count_.add(Counter::values_written, std::uint64_t(6) * topology.size());
-    this->count_.add(Counter::vertex_reads, reads);
+    this->count_.add(Counter::vertex_reads, reads_[body]);
   }
 
   static std::vector<Range> primitive_ranges(const Topology& topology) {
@@ -71,6 +75,7 @@ class TopDown final : public StoredHierarchyStrategy<S, Count>,
   }
 
   std::vector<std::vector<Range>> ranges_;
+  std::vector<std::uint64_t> reads_;  ///< [body] of vertices, by an update
 };
 
 }  // namespace

@@ -27,11 +27,11 @@ std::optional<Topology> over_clip(const SceneView<S>& scene, const ClipMotion<S>
                                      {.width = before.width, .leaf_size = before.leaf_size});
 }
 
-template <class S, class Count>
-class Tsah final : public StoredHierarchyStrategy<S, Count>,
+template <class S>
+class Tsah final : public StoredHierarchyStrategy<S>,
                    public AnswersSelfPairs,
                    public TakesGeometryChanges<S> {
-  using Base = StoredHierarchyStrategy<S, Count>;
+  using Base = StoredHierarchyStrategy<S>;
 
  public:
   static constexpr Foresight foresight = Foresight::whole_clip;

@@ -51,7 +51,8 @@ const char* name(Counter counter);
 /// Returns the meaning of a counter in one line.
 const char* meaning(Counter counter);
 
-/// The counter table of one strategy instance; cleared by `reset`.
+/// The counter table of one strategy instance; cleared by `reset`. Instances count while they are timed, too:
+/// inner loops count in variables of their own, and add their sums here once.
 struct Counters {
   std::array<std::uint64_t, std::size_t(Counter::count)> values{};
   /// Counts bound events by the depth of the node at which they occur (0: root); the last entry sums all
@@ -59,6 +60,9 @@ struct Counters {
   std::array<std::uint64_t, 64> events_at_depth{};
   std::uint64_t& operator[](Counter c) { return values[std::size_t(c)]; }
   std::uint64_t operator[](Counter c) const { return values[std::size_t(c)]; }
+  void add(Counter c, std::uint64_t n = 1) { (*this)[c] += n; }
+  void peak(Counter c, std::uint64_t n) { (*this)[c] = std::max((*this)[c], n); }
+  void event_at(std::size_t depth) { ++events_at_depth[std::min(depth, events_at_depth.size() - 1)]; }
 
   /// A counter of a strategy's own.
   struct Named {
@@ -69,26 +73,6 @@ struct Counters {
   /// Adds n to a strategy's own counter, which starts at 0. Throws std::logic_error if a counter of the enum
   /// has that name. O(named counters).
   void add(std::string_view own_name, std::uint64_t n);
-};
-
-/// Counting policies. Every strategy is compiled with both; reported times come from the silent one.
-struct Counting {
-  Counters table;
-  void add(Counter c, std::uint64_t n = 1) { table[c] += n; }
-  void peak(Counter c, std::uint64_t n) {
-    if (n > table[c]) table[c] = n;
-  }
-  void event_at(std::size_t depth) {
-    ++table.events_at_depth[std::min(depth, table.events_at_depth.size() - 1)];
-  }
-  static constexpr bool enabled = true;
-};
-struct Silent {
-  Counters table;
-  void add(Counter, std::uint64_t = 1) {}
-  void peak(Counter, std::uint64_t) {}
-  void event_at(std::size_t) {}
-  static constexpr bool enabled = false;
 };
 
 }  // namespace kbvh

@@ -1,27 +1,18 @@
 # Shared by the build in the tree and, installed, by projects that add strategies of their own.
 
-# kbvh_add_strategy(NAME SOURCE TARGET [SCALARS_APART] [GROUP group]): compiles SOURCE into TARGET (a static library) and
-# lists NAME, the word in its KBVH_STRATEGY(NAME), in the manifest.
+# kbvh_add_strategy(NAME SOURCE TARGET [GROUP group]): compiles SOURCE into TARGET (a static library) and lists NAME, the
+# word in its KBVH_STRATEGY(NAME), in the manifest.
 # GROUP: with KBVH_UNITY_STRATEGIES, SOURCE is compiled in one unit with the others of this group, whose names it does not
 # use.
-# SCALARS_APART: otherwise, a SOURCE with one entry or several, all in both scalars, is compiled once a scalar and side by
-# side. It is for those that take long.
 # KBVH_STRATEGIES, a list of such words, leaves out all others.
 function(kbvh_add_strategy name source target)
-  cmake_parse_arguments(PARSE_ARGV 3 arg "SCALARS_APART" "GROUP" "")
+  cmake_parse_arguments(PARSE_ARGV 3 arg "" "GROUP" "")
   if(KBVH_STRATEGIES AND NOT name IN_LIST KBVH_STRATEGIES)
     return()
   endif()
   target_sources(${target} PRIVATE ${source})
   if(arg_GROUP AND KBVH_UNITY_STRATEGIES)
     set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${arg_GROUP})
-  elseif(arg_SCALARS_APART)
-    cmake_path(ABSOLUTE_PATH source BASE_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR} OUTPUT_VARIABLE file)
-    set(in_double ${CMAKE_CURRENT_BINARY_DIR}/in_double/${name}.cpp)
-    file(CONFIGURE OUTPUT ${in_double} CONTENT "#define KBVH_SCALARS_HERE double_only\n#include \"@file@\"\n" @ONLY)
-    target_sources(${target} PRIVATE ${in_double})
-    set_source_files_properties(${source} PROPERTIES
-      COMPILE_DEFINITIONS "KBVH_SCALARS_HERE=float_only;KBVH_JOINS_SCALARS")
   endif()
   kbvh_add_about(${name} ${source} ${target})
   set_property(GLOBAL APPEND PROPERTY KBVH_STRATEGY_NAMES ${name})

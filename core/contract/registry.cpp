@@ -4,7 +4,6 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "core/base/assert.hpp"
 #include "core/motion/admissible.hpp"
 #include "core/scene/self_pairs.hpp"
 
@@ -16,18 +15,6 @@ std::vector<StrategyEntry> with_unique_ids(std::vector<StrategyEntry> entries) {
       if (entries[i].info.id == entries[j].info.id)
         throw std::logic_error("two strategies are registered as '" + entries[i].info.id + "'");
   return entries;
-}
-
-std::vector<StrategyEntry> joined_scalars(std::vector<StrategyEntry> in_float,
-                                          const std::vector<StrategyEntry>& in_double) {
-  KBVH_ASSERT(in_float.size() == in_double.size());
-  for (std::size_t i = 0; i < in_float.size(); ++i) {
-    KBVH_ASSERT(in_float[i].info.id == in_double[i].info.id);
-    KBVH_ASSERT(in_float[i].make_float != nullptr && in_double[i].make_double != nullptr);
-    in_float[i].info.has_double = true;
-    in_float[i].make_double = in_double[i].make_double;
-  }
-  return in_float;
 }
 
 const StrategyEntry& find_strategy(const std::vector<StrategyEntry>& entries, std::string_view id) {
@@ -105,21 +92,20 @@ Topologies build_topologies(const SceneView<S>& scene, Playback<S>& playback, co
 
 template <class S>
 std::unique_ptr<Strategy<S>> create(const StrategyEntry& entry, const SceneView<S>& scene,
-                                    Playback<S>& playback, Topologies topologies, const Params& params,
-                                    CountingPolicy policy) {
+                                    Playback<S>& playback, Topologies topologies, const Params& params) {
   const auto factory = entry.factory<S>();
   if (factory == nullptr)
     throw ConfigError("'" + entry.info.id + "' has no " + (sizeof(S) == 4 ? "float" : "double") + " version");
   // A strategy within another one works with the threads of that one.
   if (const std::uint32_t threads = threads_of(params); threads > 1) playback.use_threads(threads);
-  return factory(scene, playback, std::move(topologies), params, policy);
+  return factory(scene, playback, std::move(topologies), params);
 }
 
 #define KBVH_INSTANTIATE(S)                                                                             \
   template std::string unsuitable_bodies(const Info&, const Scene<S>&);                                 \
   template Topologies build_topologies(const SceneView<S>&, Playback<S>&, const BuilderConfig&);        \
   template std::unique_ptr<Strategy<S>> create(const StrategyEntry&, const SceneView<S>&, Playback<S>&, \
-                                               Topologies, const Params&, CountingPolicy);
+                                               Topologies, const Params&);
 KBVH_INSTANTIATE(float)
 KBVH_INSTANTIATE(double)
 #undef KBVH_INSTANTIATE

@@ -6,15 +6,12 @@
 
 namespace kbvh {
 
-/// The counting policy of an instance. Benchmarks take times from silent instances.
-enum class CountingPolicy : std::uint8_t { counting, silent };
-
 /// A registered contestant: its description and its factory functions.
 struct StrategyEntry {
   Info info;
   template <class S>
   using Factory = std::unique_ptr<Strategy<S>> (*)(const SceneView<S>&, Playback<S>&, Topologies,
-                                                   const Params&, CountingPolicy);
+                                                   const Params&);
   Factory<float> make_float = nullptr;
   Factory<double> make_double = nullptr;
 
@@ -51,52 +48,28 @@ Capabilities capabilities(const Declared& declared) {
           .changes = has<T, AnswersChanges<S>>(),
           .rays = has<T, AnswersRays<S>>()};
 }
-template <template <class, class> class T, class S, class Count>
-std::unique_ptr<Strategy<S>> construct(const SceneView<S>& scene, Playback<S>& playback,
-                                       Topologies&& topologies, const Params& params) {
-  return std::make_unique<T<S, Count>>(scene, MotionView<T<S, Count>::foresight, S>(playback),
-                                       std::move(topologies), params);
-}
-template <template <class, class> class T, class S>
+template <template <class> class T, class S>
 std::unique_ptr<Strategy<S>> make(const SceneView<S>& scene, Playback<S>& playback, Topologies topologies,
-                                  const Params& params, CountingPolicy policy) {
-#ifndef KBVH_COUNTING_ONLY
-  if (policy == CountingPolicy::silent)
-    return construct<T, S, Silent>(scene, playback, std::move(topologies), params);
-#else
-  (void)policy;
-#endif
-  return construct<T, S, Counting>(scene, playback, std::move(topologies), params);
+                                  const Params& params) {
+  return std::make_unique<T<S>>(scene, MotionView<T<S>::foresight, S>(playback), std::move(topologies),
+                                params);
 }
 }  // namespace detail
 
 /// The scene scalars for which a strategy exists.
 enum class Scalars : std::uint8_t { both, float_only, double_only };
 
-namespace detail {
-#ifdef KBVH_SCALARS_HERE
-constexpr Scalars scalars_here = Scalars::KBVH_SCALARS_HERE;
-#else
-constexpr Scalars scalars_here = Scalars::both;
-#endif
-}  // namespace detail
-
-/// Registers the class template T<Scalar, CountingPolicy>, which must
+/// Registers the class template T<Scalar>, which must
 ///   - derive from Strategy<Scalar>, and from the interfaces of its optional abilities,
 ///   - define `static constexpr Foresight foresight`,
 ///   - be constructible from (SceneView<S>, MotionView<foresight, S>, Topologies, const Params&).
 /// The abilities are derived from the class: a given `Info::can` is overwritten.
-/// `here` makes the instances of two parts of a source distinct functions (SCALARS_APART): the linker would
-/// merge them otherwise.
-template <template <class, class> class T, Scalars existing = Scalars::both,
-          Scalars here = detail::scalars_here>
+template <template <class> class T, Scalars scalars = Scalars::both>
 StrategyEntry make_entry(Info info) {
-  constexpr Scalars scalars = here == Scalars::both ? existing : here;
-  static_assert(existing == Scalars::both || scalars == existing, "SCALARS_APART needs both scalars");
   using Any = std::conditional_t<scalars == Scalars::double_only, double, float>;
   StrategyEntry entry;
-  info.foresight = T<Any, Silent>::foresight;
-  info.can = detail::capabilities<T<Any, Silent>, Any>(info.declares);
+  info.foresight = T<Any>::foresight;
+  info.can = detail::capabilities<T<Any>, Any>(info.declares);
   info.has_float = scalars != Scalars::double_only;
   info.has_double = scalars != Scalars::float_only;
   entry.info = std::move(info);
@@ -105,27 +78,9 @@ StrategyEntry make_entry(Info info) {
   return entry;
 }
 
-/// Adds to each entry the factory of the other scalar. Both vectors hold the same ids in the same order.
-std::vector<StrategyEntry> joined_scalars(std::vector<StrategyEntry> in_float,
-                                          const std::vector<StrategyEntry>& in_double);
-
 /// Defines the function through which the generated manifest finds a source file. In strategies/NAME.cpp:
 ///   KBVH_STRATEGY(NAME) { return {make_entry<MyStrategy>({.id = ...})}; }
-/// A source that takes long to compile is compiled once a scalar (kbvh_add_strategy, SCALARS_APART). The part
-/// for float then joins both.
-#ifndef KBVH_SCALARS_HERE
 #define KBVH_STRATEGY(name) std::vector<kbvh::StrategyEntry> kbvh_strategy_##name()
-#elif defined(KBVH_JOINS_SCALARS)
-#define KBVH_STRATEGY(name)                                                                             \
-  std::vector<kbvh::StrategyEntry> kbvh_strategy_##name##_in_double();                                  \
-  static std::vector<kbvh::StrategyEntry> kbvh_strategy_##name##_in_float();                            \
-  std::vector<kbvh::StrategyEntry> kbvh_strategy_##name() {                                             \
-    return kbvh::joined_scalars(kbvh_strategy_##name##_in_float(), kbvh_strategy_##name##_in_double()); \
-  }                                                                                                     \
-  static std::vector<kbvh::StrategyEntry> kbvh_strategy_##name##_in_float()
-#else
-#define KBVH_STRATEGY(name) std::vector<kbvh::StrategyEntry> kbvh_strategy_##name##_in_double()
-#endif
 
 /// Returns all contestants linked into this program, in manifest order. Defined by the manifest, a source
 /// that the build generates from the list of strategies: a program that links no manifest has no registry.
@@ -159,8 +114,7 @@ Topologies build_topologies(const SceneView<S>& scene, Playback<S>& playback, co
 /// ConfigError if the strategy does not exist in scalar S.
 template <class S>
 std::unique_ptr<Strategy<S>> create(const StrategyEntry& entry, const SceneView<S>& scene,
-                                    Playback<S>& playback, Topologies topologies, const Params& params,
-                                    CountingPolicy policy);
+                                    Playback<S>& playback, Topologies topologies, const Params& params);
 
 /// Makes instances for a strategy that consists of other strategies and forwards calls to them.
 template <class S>
@@ -169,14 +123,14 @@ struct NestedStrategies {
   template <class Motion>
   static std::unique_ptr<Strategy<S>> create(const StrategyEntry& entry, const SceneView<S>& scene,
                                              const Motion& motion, Topologies topologies,
-                                             const Params& params, CountingPolicy policy) {
+                                             const Params& params) {
     constexpr Foresight offered = std::is_base_of_v<ClipMotion<S>, Motion>      ? Foresight::whole_clip
                                   : std::is_base_of_v<SegmentMotion<S>, Motion> ? Foresight::next_keyframe
                                   : std::is_base_of_v<SteppedMotion<S>, Motion> ? Foresight::step_bound
                                                                                 : Foresight::none;
     if (entry.info.foresight > offered)
       throw ConfigError("'" + entry.info.id + "' needs more foresight than the motion provides");
-    return kbvh::create(entry, scene, *motion.playback_, std::move(topologies), params, policy);
+    return kbvh::create(entry, scene, *motion.playback_, std::move(topologies), params);
   }
 };
 

@@ -7,9 +7,7 @@ Strategy<S>::~Strategy() = default;
 
 template class Strategy<float>;
 template class Strategy<double>;
-template class CountedStrategy<float, Counting>;
-template class CountedStrategy<float, Silent>;
-template class CountedStrategy<double, Counting>;
-template class CountedStrategy<double, Silent>;
+template class CountedStrategy<float>;
+template class CountedStrategy<double>;
 
 }  // namespace kbvh

@@ -298,9 +298,13 @@ class Strategy {
   /// Describes in words the choices made since `reset` by a strategy that chooses; empty for all others.
   virtual std::string choice() const { return {}; }
 
+  /// Makes this an instance whose time is taken: it leaves out the counts that take work of their own, which
+  /// are those within a peer's library and those of bodies that rays did not enter. Before the first `reset`.
+  virtual void be_timed() { timed_ = true; }
+
   /// Returns everything counted since `reset`. The reset itself and, for a strategy that chooses, a change of
-  /// its choice are not counted, because they are not running costs. A silent instance counts only triangle
-  /// tests and bytes.
+  /// its choice are not counted, because they are not running costs. A timed instance leaves some out
+  /// (be_timed).
   Counters counters() const {
     Counters table = counted();
     table[Counter::triangle_tests] += triangle_stats_.tests;
@@ -335,6 +339,8 @@ class Strategy {
   /// Returns the counts since `start_counting`, without triangle tests and bytes.
   virtual Counters counted() const { return {}; }
 
+  /// Returns whether this instance is timed (be_timed).
+  bool is_timed() const { return timed_; }
   /// Returns the time of the last `reset` or `advance`, or the end of the last span or sweep.
   double time() const { return time_; }
   /// Returns the time before `time()`; equal to it after `reset`.
@@ -393,12 +399,13 @@ class Strategy {
   double time_ = 0, previous_time_ = 0;
   double earliest_ = 0;  ///< earliest time of the next `advance`, between frames
   bool between_frames_ = false;
+  bool timed_ = false;
   AnswerHistory histories_[2];  ///< [Answer] of `compare_answers`
   std::optional<Abilities> abilities_;
 };
 
-/// A strategy that counts by the policy Count (Counting or Silent).
-template <class S, class Count>
+/// A strategy that counts its work in a table.
+template <class S>
 class CountedStrategy : public Strategy<S> {
  public:
   using Strategy<S>::Strategy;
@@ -407,31 +414,29 @@ class CountedStrategy : public Strategy<S> {
   /// Clears counts that are kept outside `count_`; called when counts are cleared.
   virtual void counts_cleared() {}
   /// Adds counts that are kept outside `count_` to `table`: entries of the enum, or the strategy's own
-  /// counters (Counters::add). Called for counting instances only.
+  /// counters (Counters::add).
   virtual void add_counts(Counters& /*table*/) const {}
 
-  /// Returns where queries of rays count the bodies that they enter or leave out; null for silent instances.
-  RayBodies* ray_bodies() { return Count::enabled ? &ray_bodies_ : nullptr; }
+  /// Returns where queries of rays count the bodies that they enter or leave out; null for timed instances.
+  RayBodies* ray_bodies() { return this->is_timed() ? nullptr : &ray_bodies_; }
 
-  Count count_;
+  Counters count_;
 
  private:
   void start_counting() final {
-    count_.table = {};
+    count_ = {};
     ray_bodies_ = {};
     first_fetch_ = this->sampled_.fetched();
     counts_cleared();
   }
   Counters counted() const final {
-    Counters table = count_.table;
-    if constexpr (Count::enabled) {
-      table[Counter::positions_fetched] += this->sampled_.fetched() - first_fetch_;
-      add_counts(table);
-      if (ray_bodies_.entered + ray_bodies_.hidden + ray_bodies_.unmet > 0) {
-        table.add("ray_bodies_entered", ray_bodies_.entered);
-        table.add("ray_bodies_hidden", ray_bodies_.hidden);
-        table.add("ray_bodies_unmet", ray_bodies_.unmet);
-      }
+    Counters table = count_;
+    table[Counter::positions_fetched] += this->sampled_.fetched() - first_fetch_;
+    add_counts(table);
+    if (ray_bodies_.entered + ray_bodies_.hidden + ray_bodies_.unmet > 0) {
+      table.add("ray_bodies_entered", ray_bodies_.entered);
+      table.add("ray_bodies_hidden", ray_bodies_.hidden);
+      table.add("ray_bodies_unmet", ray_bodies_.unmet);
     }
     return table;
   }
@@ -443,10 +448,8 @@ class CountedStrategy : public Strategy<S> {
 // Compiled once, in strategy.cpp, and not with every strategy.
 extern template class Strategy<float>;
 extern template class Strategy<double>;
-extern template class CountedStrategy<float, Counting>;
-extern template class CountedStrategy<float, Silent>;
-extern template class CountedStrategy<double, Counting>;
-extern template class CountedStrategy<double, Silent>;
+extern template class CountedStrategy<float>;
+extern template class CountedStrategy<double>;
 
 /// One topology per body; empty for strategies that build their own.
 using Topologies = std::vector<Topology>;

@@ -51,7 +51,7 @@ class TypedWorld final : public detail::WorldImplementation {
     check_not_started();
     const Contestant contestant = contestant_of(strategy, params, topology);
     played_ = std::make_unique<Scene<S>>(whole_scene());
-    auto session = std::make_unique<Session<S>>(*played_, contestant, CountingPolicy::counting);
+    auto session = std::make_unique<Session<S>>(*played_, contestant);
     session->reset(t);
     session_ = std::move(session);
     fetched_for_questions_ = 0;
@@ -285,7 +285,7 @@ class TypedWorld final : public detail::WorldImplementation {
                                     "' cannot be verified: its positions are set frame by frame");
     const Contestant contestant = contestant_of(strategy, params, topology);
     const Scene<S> scene = whole_scene();
-    Session<S> session(scene, contestant, CountingPolicy::counting);
+    Session<S> session(scene, contestant);
     Oracle<S> oracle(scene);
     return plain(kbvh::verify(session, frames, oracle));
   }

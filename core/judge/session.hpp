@@ -25,16 +25,19 @@ struct Contestant {
   BuilderConfig builder;  ///< ignored by strategies that build their own hierarchy
 };
 
+/// What a session's instance is for: an instance is timed by Strategy::be_timed.
+enum class Use : std::uint8_t { verified, timed };
+
 /// Drives one contestant on one scene. This is the only driver: verification, benchmarks and lessons all use
 /// it.
 template <class S>
 class Session {
  public:
   /// Builds the topologies at the first frame and makes the instance. Throws ConfigError.
-  Session(const Scene<S>& scene, const Contestant& contestant, CountingPolicy policy)
+  Session(const Scene<S>& scene, const Contestant& contestant, Use use = Use::verified)
       : original_(&scene),
         contestant_(contestant),
-        policy_(policy),
+        use_(use),
         info_(&contestant.entry->info),
         changing_(info_->can.geometry_changes ? std::optional<ChangingScene<S>>(scene) : std::nullopt),
         scene_(changing_ ? &changing_->scene() : &scene),
@@ -204,7 +207,8 @@ class Session {
     const Params params(info_->id, info_->parameters, contestant_.params);
     Topologies topologies;
     if (!info_->topology.own) topologies = build_topologies(view_, playback_, contestant_.builder);
-    strategy_ = create(*contestant_.entry, view_, playback_, std::move(topologies), params, policy_);
+    strategy_ = create(*contestant_.entry, view_, playback_, std::move(topologies), params);
+    if (use_ == Use::timed) strategy_->be_timed();
   }
   void seek(double t) {
     playback_.seek(t);
@@ -213,7 +217,7 @@ class Session {
   }
   const Scene<S>* original_;
   Contestant contestant_;
-  CountingPolicy policy_;
+  Use use_;
   const Info* info_;
   std::optional<ChangingScene<S>> changing_;  ///< for strategies that support geometry changes
   const Scene<S>* scene_;

@@ -8,13 +8,14 @@
 namespace kbvh {
 
 /// Turns overlapping leaves into candidate pairs: appends the primitive pairs of two leaves whose own boxes
-/// overlap. One object serves one pair of bodies and fetches the positions that it reads. Within one body,
-/// the caller passes each two leaves once, and also each leaf of several primitives with itself.
-template <class S, class Count>
+/// overlap. One object serves one pair of bodies, fetches the positions that it reads, and adds its box tests
+/// to `tests`. Within one body, the caller passes each two leaves once, and also each leaf of several
+/// primitives with itself.
+template <class S>
 class LeafPairs {
  public:
   LeafPairs(const SceneView<S>& scene, const SampledMotion<S>& motion, std::uint32_t body_a,
-            const Topology& a, std::uint32_t body_b, const Topology& b, Count& count, PairBuffer& out)
+            const Topology& a, std::uint32_t body_b, const Topology& b, std::uint64_t& tests, PairBuffer& out)
       : motion_(&motion),
         primitives_a_(&scene.primitives(body_a)),
         primitives_b_(&scene.primitives(body_b)),
@@ -22,7 +23,7 @@ class LeafPairs {
         body_b_(body_b),
         a_(&a),
         b_(&b),
-        count_(&count),
+        tests_(&tests),
         out_(&out) {}
 
   void operator()(std::uint32_t leaf_a, std::uint32_t leaf_b) {
@@ -57,9 +58,10 @@ class LeafPairs {
         if (box_a.overlaps(boxes_b[j]))
           out_->push_back({body_a_, primitive, body_b_, b_->primitives[nb.first() + j]});
     }
-    count_->add(Counter::box_tests, tests);
+    *tests_ += tests;
   }
-  LaneBox<S> box(std::uint32_t body, const Primitives& primitives, std::uint32_t primitive) const {
+  [[gnu::always_inline]] LaneBox<S> box(std::uint32_t body, const Primitives& primitives,
+                                        std::uint32_t primitive) const {
     const auto vertices = primitives[primitive];
     motion_->fetch(body, vertices);
     return LaneBox<S>::of(vertices, motion_->positions(body));
@@ -70,7 +72,7 @@ class LeafPairs {
   std::uint32_t body_a_, body_b_;
   const Topology* a_;
   const Topology* b_;
-  Count* count_;
+  std::uint64_t* tests_;
   PairBuffer* out_;
 };
 

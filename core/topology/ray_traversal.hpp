@@ -37,18 +37,18 @@ void sort_nearest_last(std::vector<RayNode<Node>>& nodes, std::size_t first) {
 ///   children(Node, visit)                   calls visit(child) for each child of an inner node
 ///   bool leaf(Node, test)                   returns false for an inner node, else calls test(primitive) for
 ///                                           each primitive until one call returns true
-/// The caller owns the stack. Returns whether the search is over (RaySearch).
-template <class Tree, class S, class Count>
+/// The caller owns the stack. Adds the box tests to `tests`. Returns whether the search is over (RaySearch).
+template <class Tree, class S>
 bool follow_ray(const Tree& tree, RaySearch<S>& search, std::uint32_t body, const Primitives& primitives,
-                const S* positions, std::vector<RayNode<typename Tree::Node>>& stack, Count& count,
+                const S* positions, std::vector<RayNode<typename Tree::Node>>& stack, std::uint64_t& tests,
                 TriangleTestStats& stats) {
   using Node = typename Tree::Node;
   const RaySlabs slabs(search.line());
-  std::uint64_t tests = 0;
+  std::uint64_t made = 0;
   stack.clear();
   const auto enter = [&](Node node) {
     double near = 0;
-    ++tests;
+    ++made;
     if (slabs.meet(tree.box(node), search.limit(), near)) stack.push_back({near, node});
   };
   enter(tree.root());
@@ -65,7 +65,7 @@ bool follow_ray(const Tree& tree, RaySearch<S>& search, std::uint32_t body, cons
     tree.children(top.node, enter);
     sort_nearest_last(stack, before);
   }
-  count.add(Counter::box_tests, tests);
+  tests += made;
   return over;
 }
 
@@ -154,10 +154,10 @@ class RayBodyOrder {
 };
 
 /// Answers rays over all bodies of a scene, front to back: the shared part of strategies without a wide
-/// hierarchy. box_of(body) returns a box around a body, empty if it has none. follow(body, search) follows a
-/// ray through one body that consists of polygons, and returns whether the search is over. Positions are
-/// fetched of the bodies that a ray enters. Adds to `counts` what the call did with each body (null: not
-/// counted); returns the tests of rays and bodies.
+/// hierarchy. box_of(body) returns a box around a body, empty if it has none. follow(body, search, tests)
+/// follows a ray through one body that consists of polygons, adds its box tests to `tests`, and returns
+/// whether the search is over. Positions are fetched of the bodies that a ray enters. Adds to `counts` what
+/// the call did with each body (null: not counted); returns the box tests.
 template <class S, class BoxOf, class Follow>
 std::uint64_t find_hits_by_body(const SceneView<S>& scene, const SampledMotion<S>& motion, RayQuery query,
                                 std::span<const Ray<S>> rays, std::span<RayHit> hits, RayBodyOrder& order,
@@ -167,10 +167,12 @@ std::uint64_t find_hits_by_body(const SceneView<S>& scene, const SampledMotion<S
   for (std::size_t i = 0; i < rays.size(); ++i) {
     RaySearch<S> search(rays[i], query);
     const auto limit = [&] { return search.limit(); };
-    tests += order.follow(search.line(), limit, [&](std::uint32_t body, bool first) {
-      if (first) motion.fetch_all(body);
-      return follow(body, search);
-    });
+    const std::uint64_t bodies_tested =
+        order.follow(search.line(), limit, [&](std::uint32_t body, bool first) {
+          if (first) motion.fetch_all(body);
+          return follow(body, search, tests);
+        });
+    tests += bodies_tested;
     hits[i] = search.hit();
   }
   order.count(counts);

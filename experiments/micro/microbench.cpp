@@ -178,12 +178,12 @@ void events(benchmark::State& state, const char* id) {
     return;
   }
   const Contestant contestant{entry, {}, entry->info.topology.preferred};
-  Session<float> counted(scene, contestant, CountingPolicy::counting);
+  Session<float> counted(scene, contestant);
   PhaseTimes ignored;
   counted.reset(0);
   counted.advance(8, ignored);
   const auto failed = counted.strategy().counters()[Counter::certificates_failed];
-  Session<float> session(scene, contestant, CountingPolicy::silent);
+  Session<float> session(scene, contestant);
   for (auto _ : state) {
     session.reset(0);
     PhaseTimes times;

@@ -88,7 +88,7 @@ CaseResult run_here(const Playable<S>& stress, Oracle<S>& oracle, const Contesta
   const std::clock_t begin = std::clock();
   try {
     result.extent = largest_coordinate(stress.scene);
-    Session<S> session(stress.scene, spec.contestant(), CountingPolicy::counting);
+    Session<S> session(stress.scene, spec.contestant());
     const Verification seen =
         verify<S>(session, stress.frames, oracle, stress.script.empty() ? nullptr : &stress.script,
                   {.every_nth_frame = stress.compare_every});

@@ -72,7 +72,7 @@ PairBuffer swept(const Scene<double>& scene, const std::string& strategy) {
   const StrategyEntry& entry = strategy_named(strategy);
   if (!entry.info.can.contacts)
     throw io::InputError("the strategy '" + strategy + "' finds no contacts, so it has no swept pairs");
-  Session<double> session(scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+  Session<double> session(scene, {&entry, {}, entry.info.topology.preferred});
   session.reset(0);
   std::vector<std::vector<double>> copies;
   std::vector<const double*> before;

@@ -91,7 +91,7 @@ void ContactMeasurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle
   measured.steady_from = steady_from_;
   entrant.attempt([&] {
     {
-      Session<S> session(*scene_, spec.contestant(), CountingPolicy::counting);
+      Session<S> session(*scene_, spec.contestant());
       const auto ask = [&](PhaseTimes& times, std::size_t k) {
         contacts_.clear();
         measured.verification.candidates += session.contacts(knots_[k + 1], contacts_, times);
@@ -110,7 +110,7 @@ void ContactMeasurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle
       return;
     }
     const auto begin = std::chrono::steady_clock::now();
-    entrant.session = std::make_unique<Session<S>>(*scene_, spec.contestant(), CountingPolicy::silent);
+    entrant.session = std::make_unique<Session<S>>(*scene_, spec.contestant(), Use::timed);
     measured.build_seconds = seconds_since(begin);
   });
   this->entrants_.push_back(std::move(entrant));

@@ -206,7 +206,7 @@ Scene<S> two_triangles() {
 template <class S>
 void try_parameters_as(const ContestantSpec& spec) {
   const Scene<S> scene = two_triangles<S>();
-  const Session<S> session(scene, spec.contestant(), CountingPolicy::silent);
+  const Session<S> session(scene, spec.contestant());
 }
 
 }  // namespace

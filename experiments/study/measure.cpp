@@ -92,11 +92,11 @@ void Measurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle_every)
   measured.steady_from = steady_from_;
   entrant.attempt([&] {
     {
-      Session<S> session(*scene_, spec.contestant(), CountingPolicy::counting);
+      Session<S> session(*scene_, spec.contestant());
       measured.verification = verify<S>(session, frames_, *oracle_, script_, {oracle_every, quality_samples});
     }
     if (query_.changes && measured.verification.holds()) {
-      Session<S> session(*scene_, spec.contestant(), CountingPolicy::counting);
+      Session<S> session(*scene_, spec.contestant());
       measured.changes = verify_changes<S>(session, frames_, *oracle_, script_,
                                            {oracle_every, VerifyChangesOptions::Calls::every_frame});
       measured.verification.first_violation = measured.changes.first_violation;
@@ -106,7 +106,7 @@ void Measurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle_every)
     } else {
       replay(measured);
       const auto begin = std::chrono::steady_clock::now();
-      entrant.session = std::make_unique<Session<S>>(*scene_, spec.contestant(), CountingPolicy::silent);
+      entrant.session = std::make_unique<Session<S>>(*scene_, spec.contestant(), Use::timed);
       measured.build_seconds = seconds_since(begin);
     }
   });
@@ -115,7 +115,7 @@ void Measurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle_every)
 
 template <class S>
 void Measurement<S>::replay(Measured& measured) {
-  Session<S> session(*scene_, measured.spec->contestant(), CountingPolicy::counting);
+  Session<S> session(*scene_, measured.spec->contestant());
   const bool promises = session.info().guarantee != Guarantee::approximate;
   const bool exact = !query_.changes || *query_.changes == Answer::pairs;
   ChangeReplay added;

@@ -21,7 +21,7 @@ struct Measured {
   Verification verification;
   ChangesVerification changes;  ///< of answers as changes
   std::uint64_t sampled_every = 1;
-  /// Of the replay: the calls that are timed and no others, on a counting instance.
+  /// Of the replay: the calls that are timed and no others.
   Counters counters;
   std::vector<std::uint64_t> answers;  ///< of the replay: the size of each frame's answer
   std::string refused;                 ///< the reason for a missing time, or empty
@@ -138,7 +138,7 @@ class Measurement : public Entrants<Entrant<S>> {
   /// Verifies a contestant over all frames, comparing every n-th with the oracle; its changes, too, if these
   /// are asked. Then plays exactly the timed calls on a second instance, which counts; compares the answers
   /// of the same frames with the oracle, and keeps the sizes of all. If the guarantee holds, creates the
-  /// silent instance that will be timed. Exceptions of the strategy count as a broken guarantee; ConfigError
+  /// instance that will be timed. Exceptions of the strategy count as a broken guarantee; ConfigError
   /// is passed on.
   void add(const ContestantSpec& spec, std::uint64_t oracle_every);
 

@@ -171,7 +171,7 @@ std::uint64_t RayMeasurement<S>::ask(Session<S>& session, PhaseTimes& times) {
 template <class S>
 void RayMeasurement<S>::verify(RayEntrant<S>& entrant, std::uint64_t oracle_every, Answers& answers) {
   Measured& measured = entrant.measured;
-  Session<S> session(*scene_, measured.spec->contestant(), CountingPolicy::counting);
+  Session<S> session(*scene_, measured.spec->contestant());
   std::vector<Ray<S>> rays;
   for (const std::size_t i : compared_) rays.push_back(rays_[i]);
   answers.resize(frames_.size());
@@ -209,7 +209,7 @@ void RayMeasurement<S>::verify(RayEntrant<S>& entrant, std::uint64_t oracle_ever
 
 template <class S>
 void RayMeasurement<S>::replay(Measured& measured, const Answers& answers) {
-  Session<S> session(*scene_, measured.spec->contestant(), CountingPolicy::counting);
+  Session<S> session(*scene_, measured.spec->contestant());
   const bool exact = session.info().rays_guarantee == Guarantee::exact;
   const auto same = [&](const RayHit& a, const RayHit& b) {
     return study_.query == RayQuery::any ? bool(a) == bool(b) : a == b;
@@ -242,7 +242,7 @@ void RayMeasurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle_eve
     }
     replay(measured, answers);
     const auto begin = std::chrono::steady_clock::now();
-    entrant.session = std::make_unique<Session<S>>(*scene_, spec.contestant(), CountingPolicy::silent);
+    entrant.session = std::make_unique<Session<S>>(*scene_, spec.contestant(), Use::timed);
     measured.build_seconds = seconds_since(begin);
   });
   this->entrants_.push_back(std::move(entrant));

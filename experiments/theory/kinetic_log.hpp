@@ -192,8 +192,8 @@ Recording<S> record_strategy(const StrategyEntry& entry, const Scene<S>& scene, 
   return record_events(
       scene, script, play,
       [&](const SceneView<S>& view, Playback<S>& playback, const Topologies& topologies) {
-        return create(entry, view, playback, topologies, Params(entry.info.id, entry.info.parameters, params),
-                      CountingPolicy::counting);
+        return create(entry, view, playback, topologies,
+                      Params(entry.info.id, entry.info.parameters, params));
       },
       watcher);
 }

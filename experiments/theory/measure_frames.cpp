@@ -14,7 +14,7 @@ std::uint64_t values_written(const Scene<float>& scene, const char* id, std::spa
   Contestant contestant;
   contestant.entry = &find_strategy(id);
   contestant.builder = paper_builder;
-  Session<float> session(scene, contestant, CountingPolicy::counting);
+  Session<float> session(scene, contestant);
   session.reset(frames.front());
   PhaseTimes times;
   for (const double t : frames.subspan(1)) session.advance(t, times);
@@ -54,8 +54,8 @@ void compare_frames(const Scene<float>& scene, std::span<const double> frames, F
     bottom_up += std::uint64_t(6) * topology.size();
   }
   const StrategyEntry& entry = find_strategy("kinetic_aabb");
-  const auto strategy = create(entry, view, playback, topologies,
-                               Params(entry.info.id, entry.info.parameters, {}), CountingPolicy::silent);
+  const auto strategy =
+      create(entry, view, playback, topologies, Params(entry.info.id, entry.info.parameters, {}));
   strategy->reset(frames.front());
   std::vector<BoundNotice<float>> told;
   strategy->events()->watch_bounds(&told);

@@ -34,9 +34,9 @@ SearchRun measure_searches(const std::string& tree_name, std::uint32_t leaves) {
   Playback<float> playback(scene);
   const std::vector<double> keyframes = overlaid_keyframes(scene);
   playback.seek(keyframes.front());
-  Counting count;
-  KineticBoxForest<float, AvlQueue<float>, Counting> forest(
-      view, ClipMotion<float>(playback), build_topologies(view, playback, paper_builder), count);
+  Counters count;
+  KineticBoxForest<float, AvlQueue<float>> forest(view, ClipMotion<float>(playback),
+                                                  build_topologies(view, playback, paper_builder), count);
   auto& tree = forest.tree(0);
   tree.construct_as({.root_axis = split.root_axis, .inner_axis = split.inner_axis});
   forest.reset(keyframes.front());

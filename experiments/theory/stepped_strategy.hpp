@@ -19,8 +19,8 @@ class SteppedStrategy {
                   const SceneView<float>& view, Playback<float>& playback, const Topologies& topologies,
                   double t) {
     const StrategyEntry& entry = find_strategy(id);
-    strategy_ = create(entry, view, playback, topologies,
-                       Params(entry.info.id, entry.info.parameters, params), CountingPolicy::counting);
+    strategy_ =
+        create(entry, view, playback, topologies, Params(entry.info.id, entry.info.parameters, params));
     strategy_->reset(t);
     source().watch_bounds(&touched_);
   }

@@ -66,7 +66,7 @@ void keeps_guarantee(std::uint32_t frames_per_keyframe) {
     for_each_peer(scene, [&](const Contestant& contestant) {
       ++played[describe(contestant.entry->info, contestant.params)];
       SCOPED_TRACE(describe(contestant.entry->info, contestant.params) + " on '" + scene.name + "'");
-      Session<S> session(scene, contestant, CountingPolicy::counting);
+      Session<S> session(scene, contestant);
       const Verification found = verify<S>(session, frames, oracle);
       EXPECT_TRUE(found.holds()) << found.first_violation;
       EXPECT_EQ(found.missed_candidates, 0u);
@@ -102,7 +102,7 @@ void never_lose_contacts(std::uint32_t seeds) {
     const auto frames = frame_times(scene, 2);
     for_each_peer(scene, [&](const Contestant& contestant) {
       SCOPED_TRACE(describe(contestant.entry->info, contestant.params) + ", seed " + std::to_string(seed));
-      Session<S> session(scene, contestant, CountingPolicy::counting);
+      Session<S> session(scene, contestant);
       const Verification found = verify<S>(session, frames, oracle);
       ASSERT_TRUE(found.holds()) << found.first_violation;
       ASSERT_EQ(found.missed_candidates, 0u);
@@ -123,7 +123,7 @@ TEST(Peers, RefuseToGoBackInTime) {
   const auto scene = adapters_test::awkward_scenes<float>()[0];
   for_each_peer(scene, [&](const Contestant& contestant) {
     SCOPED_TRACE(contestant.entry->info.id);
-    Session<float> session(scene, contestant, CountingPolicy::silent);
+    Session<float> session(scene, contestant);
     PhaseTimes times;
     session.reset(1);
     session.advance(2, times);
@@ -148,7 +148,7 @@ TEST(Peers, FollowPlanChangesOfBodiesAtRest) {
   std::vector<double> frames{0, .25, .5, .75, 1};
   for_each_peer(scene, [&](const Contestant& contestant) {
     SCOPED_TRACE(contestant.entry->info.id);
-    Session<float> session(scene, contestant, CountingPolicy::counting);
+    Session<float> session(scene, contestant);
     Oracle<float> oracle(scene);
     const Verification found = verify<float>(session, frames, oracle, &script);
     EXPECT_TRUE(found.holds()) << found.first_violation;
@@ -160,7 +160,7 @@ TEST(Peers, AnswerTheSameAfterStartingOver) {
   const auto scene = adapters_test::awkward_scenes<float>()[1];
   for_each_peer(scene, [&](const Contestant& contestant) {
     SCOPED_TRACE(contestant.entry->info.id);
-    Session<float> session(scene, contestant, CountingPolicy::counting);
+    Session<float> session(scene, contestant);
     PhaseTimes times;
     PairBuffer first, second;
     session.reset(0);
@@ -201,7 +201,7 @@ void range_is_kept() {
       for (const auto& params : settings(entry.info)) {
         SCOPED_TRACE(describe(entry.info, params) + (aside ? " aside" : ""));
         ASSERT_EQ(unsuitable_bodies(entry.info, scene), "");
-        Session<S> session(scene, {&entry, params, {}}, CountingPolicy::counting);
+        Session<S> session(scene, {&entry, params, {}});
         const Verification found = verify<S>(session, frame_times(scene, 3), oracle);
         EXPECT_TRUE(found.holds()) << found.first_violation;
         EXPECT_EQ(found.missed, 0u);
@@ -214,7 +214,7 @@ void range_is_kept() {
     SCOPED_TRACE(entry.info.id);
     const Scene<S> beyond = soups_within<S>(2 * most, false);
     EXPECT_TRUE(unsuitable_bodies(entry.info, beyond).starts_with("takes coordinates up to "));
-    EXPECT_THROW(Session<S>(beyond, {&entry, {}, {}}, CountingPolicy::silent), ConfigError);
+    EXPECT_THROW(Session<S>(beyond, {&entry, {}, {}}), ConfigError);
     // A motion that reaches beyond later: by a change of plans, at a knot of the new plan, by positions
     // handed in.
     Scene<S> scene = soups_within<S>(most / 4, false);
@@ -222,7 +222,7 @@ void range_is_kept() {
     PlanChange<S> change{.body = 1, .vertex = 2};
     change.velocity[1] = S(most);
     {
-      Session<S> session(scene, {&entry, {}, {}}, CountingPolicy::silent);
+      Session<S> session(scene, {&entry, {}, {}});
       session.reset(0);
       session.change_plans(std::span(&change, 1), times);
       session.advance(.5, times);
@@ -241,7 +241,7 @@ void range_is_kept() {
     std::vector<S> given(scene.bodies[1].plans.keyframe(0),
                          scene.bodies[1].plans.keyframe(0) + 3 * scene.bodies[1].plans.vertex_count());
     scene.bodies[1].plans = FlightPlans<S>::handed_in(scene.bodies[1].plans.vertex_count(), given);
-    Session<S> session(scene, {&entry, {}, {}}, CountingPolicy::silent);
+    Session<S> session(scene, {&entry, {}, {}});
     session.reset(0);
     given.push_back(0);
     given[4] = S(-1.5 * most);
@@ -275,7 +275,7 @@ TEST(Bullet, ScalingKeepsFalsePairsOfSmallMeshesAway) {
                                                   adapters_test::soup<float>({.scale = 1e-3, .seed = 23})});
   Oracle<float> oracle(scene);
   const auto candidates = [&](const std::string& scale) {
-    Session<float> session(scene, {&*found, {{"scale", scale}}, {}}, CountingPolicy::silent);
+    Session<float> session(scene, {&*found, {{"scale", scale}}, {}});
     return verify<float>(session, frame_times(scene, 2), oracle).candidates;
   };
   EXPECT_GT(candidates("none"), 3 * candidates("fit"));
@@ -298,8 +298,7 @@ TEST(Embree, RefitsEitherGeometryOfLargerBodies) {
   for (const char* geometry : {"user", "triangles"})
     for (const char* layout : {"compact", "default"}) {
       SCOPED_TRACE(std::string(geometry) + ", " + layout);
-      Session<float> session(scene, {&*found, {{"geometry", geometry}, {"layout", layout}}, {}},
-                             CountingPolicy::counting);
+      Session<float> session(scene, {&*found, {{"geometry", geometry}, {"layout", layout}}, {}});
       results.push_back(verify<float>(session, frames, oracle));
       EXPECT_TRUE(results.back().holds()) << results.back().first_violation;
       EXPECT_GT(results.back().pairs, 1000u);
@@ -313,7 +312,7 @@ TEST(Embree, LeavesTheFloatingPointStateAlone) {
                                   [](const StrategyEntry& entry) { return entry.info.id == "embree_refit"; });
   if (found == registry().end()) GTEST_SKIP() << "built without Embree";
   const auto scene = adapters_test::awkward_scenes<float>()[1];
-  Session<float> session(scene, {&*found, {}, {}}, CountingPolicy::silent);
+  Session<float> session(scene, {&*found, {}, {}});
   PhaseTimes times;
   PairBuffer pairs;
   volatile float denormal = 1e-40f;
@@ -339,7 +338,7 @@ TEST(Peers, RaysDifferFromTheTruthSeldom) {
       if (!contestant.entry->info.can.rays) return;
       SCOPED_TRACE(describe(contestant.entry->info, contestant.params));
       EXPECT_EQ(contestant.entry->info.rays_guarantee, Guarantee::approximate);
-      Session<float> session(scene, contestant, CountingPolicy::silent);
+      Session<float> session(scene, contestant);
       PhaseTimes ignored;
       PairBuffer pairs;
       std::size_t hits = 0, others = 0, asked = 0;

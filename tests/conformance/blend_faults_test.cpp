@@ -63,11 +63,11 @@ class Faulty : public BlendSource<S> {
 
 template <BlendFault fault>
 struct Reduced {
-  template <class S, class Count>
-  class Strategy : public BlendedStrategy<S, Count> {
+  template <class S>
+  class Strategy : public BlendedStrategy<S> {
    public:
     Strategy(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies, const Params&)
-        : BlendedStrategy<S, Count>(scene, motion, std::move(topologies)) {}
+        : BlendedStrategy<S>(scene, motion, std::move(topologies)) {}
 
    private:
     std::unique_ptr<BlendSource<S>> make_source(std::uint32_t /*body*/, WideHierarchy<S>& hierarchy,
@@ -80,11 +80,11 @@ struct Reduced {
 
 template <BlendFault fault>
 struct Targets {
-  template <class S, class Count>
-  class Strategy : public BlendedStrategy<S, Count> {
+  template <class S>
+  class Strategy : public BlendedStrategy<S> {
    public:
     Strategy(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies, const Params&)
-        : BlendedStrategy<S, Count>(scene, motion, std::move(topologies)) {}
+        : BlendedStrategy<S>(scene, motion, std::move(topologies)) {}
 
    private:
     std::unique_ptr<BlendSource<S>> make_source(std::uint32_t /*body*/, WideHierarchy<S>& hierarchy,
@@ -128,7 +128,7 @@ TestScene<S> three_modes() {
 }
 
 /// The first violation.
-template <class S, template <class, class> class Strategy>
+template <class S, template <class> class Strategy>
 std::string violation(const std::string& scene) {
   Info info;
   info.id = "faulty";
@@ -136,7 +136,7 @@ std::string violation(const std::string& scene) {
   info.positions = PositionUse::fetched;
   info.topology.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 4};
   const TestScene<S> test = scene == "three_modes" ? three_modes<S>() : synthetic_scene<S>(scene, 7);
-  return check(make_counting_entry<Strategy>(info), test, 7, {}, info.topology.preferred);
+  return check(make_entry<Strategy>(info), test, 7, {}, info.topology.preferred);
 }
 
 constexpr const char* scenes[] = {
@@ -157,7 +157,7 @@ TEST(BlendFaults, SoundBlendsOfKeyframesPass) {
   }
 }
 
-template <template <class, class> class Strategy>
+template <template <class> class Strategy>
 void expect_caught(const char* scene) {
   const std::string in_float = violation<float, Strategy>(scene),
                     in_double = violation<double, Strategy>(scene);

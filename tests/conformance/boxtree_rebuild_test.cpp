@@ -38,8 +38,8 @@ INSTANTIATE_TEST_SUITE_P(ChangingGeometry, EagerRebuilding, testing::ValuesIn(ge
 
 TEST(Rebuilding, ChangesTheTopologyAndStartingOverUndoesIt) {
   const auto test = synthetic_scene<float>("soups", 7);
-  Session<float> session(test.scene, {&find_strategy("kinetic_boxtree"), eager, {.width = 2, .leaf_size = 1}},
-                         CountingPolicy::counting);
+  Session<float> session(test.scene,
+                         {&find_strategy("kinetic_boxtree"), eager, {.width = 2, .leaf_size = 1}});
   const auto topology = [&] { return session.strategy().audit_view(0)->topology; };
   const std::vector<double> frames = frame_times(test.scene, 7);
   PhaseTimes ignored;
@@ -60,8 +60,7 @@ TEST(Rebuilding, ChangesTheTopologyAndStartingOverUndoesIt) {
 
 TEST(Rebuilding, IsOffByDefault) {
   const auto test = synthetic_scene<float>("soups", 7);
-  Session<float> session(test.scene, {&find_strategy("kinetic_boxtree"), {}, {.width = 2, .leaf_size = 1}},
-                         CountingPolicy::counting);
+  Session<float> session(test.scene, {&find_strategy("kinetic_boxtree"), {}, {.width = 2, .leaf_size = 1}});
   PhaseTimes ignored;
   session.reset(0);
   const Topology first = session.strategy().audit_view(0)->topology;

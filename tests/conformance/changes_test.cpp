@@ -21,7 +21,7 @@ std::string check_changes(const StrategyEntry& entry, const TestScene<S>& test, 
   if (!skipped(entry, test).empty()) return {};
   const std::vector<double> frames = test.frames.empty() ? frame_times(test.scene, l) : test.frames;
   const PlanScript<S>* const script = test.script.steps.empty() ? nullptr : &test.script;
-  Session<S> session(test.scene, {&entry, params, builder}, CountingPolicy::counting);
+  Session<S> session(test.scene, {&entry, params, builder});
   // A reset forgets what was reported, and changes of plans and of geometry.
   const std::size_t some = std::min<std::size_t>(frames.size(), 5);
   for (const std::size_t played : {some, frames.size()}) {
@@ -125,12 +125,12 @@ enum class Fault : std::uint8_t {
 };
 
 /// Tests all pairs of primitives, and answers changes in its own way, with a fault at the fourth answer.
-template <class S, class Count, Fault fault>
-class FaultyChanges : public CountedStrategy<S, Count>, public AnswersChanges<S> {
+template <class S, Fault fault>
+class FaultyChanges : public CountedStrategy<S>, public AnswersChanges<S> {
  public:
   static constexpr Foresight foresight = Foresight::none;
   FaultyChanges(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies, const Params&)
-      : CountedStrategy<S, Count>(scene, motion) {}
+      : CountedStrategy<S>(scene, motion) {}
   void reset_to(double /*t*/) override {
     if (fault == Fault::stale_after_reset) return;
     last_[0].clear();
@@ -169,9 +169,9 @@ std::string violation() {
     StrategyEntry made;
     made.info = {.id = "faulty_changes", .title = "faulty", .family = "oracle"};
     made.make_double = [](const SceneView<double>& scene, Playback<double>& playback, Topologies topologies,
-                          const Params& params, CountingPolicy) -> std::unique_ptr<Strategy<double>> {
-      return std::make_unique<FaultyChanges<double, Counting, fault>>(scene, SampledMotion<double>(playback),
-                                                                      std::move(topologies), params);
+                          const Params& params) -> std::unique_ptr<Strategy<double>> {
+      return std::make_unique<FaultyChanges<double, fault>>(scene, SampledMotion<double>(playback),
+                                                            std::move(topologies), params);
     };
     return made;
   }();

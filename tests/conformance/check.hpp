@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <list>
-#include <type_traits>
 
 #include "core/contract/registry.hpp"
 #include "core/judge/verify.hpp"
@@ -72,7 +71,7 @@ std::string check(const StrategyEntry& entry, const TestScene<S>& test, std::uin
   if (const std::string why = skipped(entry, test); !why.empty()) return why;
   const std::vector<double> frames =
       test.frames.empty() ? frame_times(test.scene, frames_per_keyframe) : test.frames;
-  Session<S> session(test.scene, {&entry, params, builder}, CountingPolicy::counting);
+  Session<S> session(test.scene, {&entry, params, builder});
   const Verification result = verify(session, std::span<const double>(frames), shared_oracle(test),
                                      test.script.steps.empty() ? nullptr : &test.script, options);
   if (!result.holds()) return result.first_violation;
@@ -81,29 +80,11 @@ std::string check(const StrategyEntry& entry, const TestScene<S>& test, std::uin
   return {};
 }
 
-/// As `make_entry`, but every instance counts: what only `check` plays is compiled half as often.
-template <template <class, class> class T>
-StrategyEntry make_counting_entry(Info info) {
-  const auto make = [](const auto& scene, auto& playback, Topologies topologies, const Params& params,
-                       CountingPolicy) {
-    using S = std::conditional_t<std::is_same_v<decltype(scene), const SceneView<float>&>, float, double>;
-    return detail::construct<T, S, Counting>(scene, playback, std::move(topologies), params);
-  };
-  info.foresight = T<float, Counting>::foresight;
-  info.can = detail::capabilities<T<float, Counting>, float>(info.declares);
-  info.has_float = info.has_double = true;
-  StrategyEntry entry;
-  entry.info = std::move(info);
-  entry.make_float = make;
-  entry.make_double = make;
-  return entry;
-}
-
 /// Requires that a strategy that changes its topology during the clip has its first topology, and answers,
 /// after a reset.
 inline void expect_reset_restores_topology(const StrategyEntry& entry) {
   const auto test = synthetic_scene<float>("sheets", 3);
-  Session<float> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+  Session<float> session(test.scene, {&entry, {}, entry.info.topology.preferred});
   PhaseTimes times;
   session.reset(test.frames[0]);
   const Topology start = session.strategy().audit_view(0)->topology;

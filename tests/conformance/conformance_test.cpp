@@ -247,9 +247,7 @@ TEST(Registry, SelfPairsAreDeclaredOrRefused) {
   std::set<std::string> able, refusing;
   for (const StrategyEntry& entry : registry()) {
     if (entry.factory<float>() == nullptr) continue;
-    const auto make = [&] {
-      Session<float>(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
-    };
+    const auto make = [&] { Session<float>(test.scene, {&entry, {}, entry.info.topology.preferred}); };
     if (entry.info.can.self_pairs)
       EXPECT_NO_THROW(make()) << entry.info.id;
     else
@@ -283,7 +281,7 @@ TEST_P(Configurations, TimeRunsForwardAndResetStartsOver) {
   const auto run = [&](const auto& test) {
     using S = std::remove_cvref_t<decltype(test.scene.bodies[0].plans.keyframe(0)[0])>;
     if (entry.factory<S>() == nullptr) return;
-    Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+    Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred});
     PhaseTimes times;
     PairBuffer first, again;
     session.reset(0);
@@ -311,7 +309,7 @@ template <class S>
 void expect_spans_enclose(const StrategyEntry& entry, const TestScene<S>& test, std::uint32_t l) {
   if (entry.factory<S>() == nullptr) return;
   if (has_self_pairs(test.scene.pairs) && !entry.info.can.self_pairs) return;
-  Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::counting);
+  Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred});
   // The frames are looked at by a second playback, which makes the same changes.
   const SceneView<S> view(test.scene);
   Playback<S> playback(test.scene);
@@ -394,7 +392,7 @@ TEST_P(Configurations, ChangesOfGeometryAreRefusedAsAWhole) {
   const auto run = [&](const auto& test) {
     using S = std::remove_cvref_t<decltype(test.scene.bodies[0].plans.keyframe(0)[0])>;
     if (entry.factory<S>() == nullptr) return;
-    Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+    Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred});
     PhaseTimes times;
     session.reset(0);
     session.advance(1, times);

@@ -67,7 +67,7 @@ void expect_contacts(const StrategyEntry& entry, const Scene<S>& scene, const Tr
                      const BuilderConfig& builder, int rounds, const std::string& where,
                      const std::map<std::string, std::string>& params = {}) {
   if (entry.factory<S>() == nullptr) return;
-  Session<S> session(scene, {&entry, params, builder}, CountingPolicy::counting);
+  Session<S> session(scene, {&entry, params, builder});
   PhaseTimes ignored;
   // More than once, for `reset` starts over.
   for (int round = 0; round < rounds; ++round) {
@@ -209,7 +209,7 @@ TEST(ContactScenes, CountWhatBoxesCost) {
   const Truth<float> truth = truth_of(test.scene);
   for (const StrategyEntry& entry : registry()) {
     if (!entry.info.can.contacts || entry.info.can.spans) continue;  // a list of pairs makes no boxes for it
-    Session<float> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::counting);
+    Session<float> session(test.scene, {&entry, {}, entry.info.topology.preferred});
     PhaseTimes ignored;
     session.reset(truth.knots[0]);
     ContactBuffer found;
@@ -240,7 +240,7 @@ TEST(ContactScenes, ResetComesBetweenContactsAndFrames) {
   const Truth<float> truth = truth_of(test.scene);
   for (const StrategyEntry& entry : registry()) {
     if (!entry.info.can.contacts || entry.factory<float>() == nullptr) continue;
-    Session<float> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+    Session<float> session(test.scene, {&entry, {}, entry.info.topology.preferred});
     PhaseTimes ignored;
     for (int round = 0; round < 2; ++round) {
       session.reset(truth.knots[0]);
@@ -268,7 +268,7 @@ TEST(ContactScenes, ResetComesBetweenContactsAndFrames) {
 template <class S>
 void expect_contacts_while_changing(const StrategyEntry& entry, const std::string& name, std::size_t& total) {
   const auto test = synthetic_scene<S>(name);
-  Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+  Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred});
   PhaseTimes ignored;
   for (int round = 0; round < 2; ++round) {
     ChangingScene<S> mirror(test.scene);
@@ -351,7 +351,7 @@ TEST(Registry, ContactsAreDeclaredOrRefused) {
   const auto test = synthetic_scene<float>("sheets");
   for (const StrategyEntry& entry : registry()) {
     if (entry.factory<float>() == nullptr || entry.info.can.contacts) continue;
-    Session<float> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+    Session<float> session(test.scene, {&entry, {}, entry.info.topology.preferred});
     session.reset(0);
     ContactBuffer contacts;
     PhaseTimes ignored;

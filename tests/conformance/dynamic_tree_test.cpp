@@ -112,9 +112,9 @@ struct Body {
   std::size_t bytes() const { return tree.bytes(); }
 };
 
-template <class S, class Count, Fault fault>
-class Simple : public BuiltEachFrame<S, Count, Body<S>> {
-  using Base = BuiltEachFrame<S, Count, Body<S>>;
+template <class S, Fault fault>
+class Simple : public BuiltEachFrame<S, Body<S>> {
+  using Base = BuiltEachFrame<S, Body<S>>;
 
  public:
   Simple(const SceneView<S>& scene, const SampledMotion<S>& motion, const Topologies&, const Params&)
@@ -161,8 +161,8 @@ class Simple : public BuiltEachFrame<S, Count, Body<S>> {
 
 template <Fault fault>
 struct With {
-  template <class S, class Count>
-  using Strategy = Simple<S, Count, fault>;
+  template <class S>
+  using Strategy = Simple<S, fault>;
 };
 
 template <Fault fault>

@@ -24,9 +24,9 @@ TestScene<S> scene_with_frames(const std::string& name, std::uint32_t l) {
 enum class Error { loses_the_last_from_the_third_frame_on, adds_one_at_every_frame };
 
 /// An exact refit that confirms too few pairs, or one too many.
-template <class S, class Count, Error error>
-class Wrong : public StoredHierarchyStrategy<S, Count> {
-  using Base = StoredHierarchyStrategy<S, Count>;
+template <class S, Error error>
+class Wrong : public StoredHierarchyStrategy<S> {
+  using Base = StoredHierarchyStrategy<S>;
 
  public:
   static constexpr Foresight foresight = Foresight::none;
@@ -55,10 +55,10 @@ class Wrong : public StoredHierarchyStrategy<S, Count> {
   void update(std::uint32_t body) override { this->refit(body); }
   std::uint64_t frame_ = 0;
 };
-template <class S, class C>
-using Loses = Wrong<S, C, Error::loses_the_last_from_the_third_frame_on>;
-template <class S, class C>
-using Adds = Wrong<S, C, Error::adds_one_at_every_frame>;
+template <class S>
+using Loses = Wrong<S, Error::loses_the_last_from_the_third_frame_on>;
+template <class S>
+using Adds = Wrong<S, Error::adds_one_at_every_frame>;
 
 Info info() {
   return {.id = "wrong",
@@ -72,7 +72,7 @@ Info info() {
 template <class S>
 Verification verified(const StrategyEntry& entry, const TestScene<S>& test, std::uint64_t every = 1,
                       const std::map<std::string, std::string>& params = {}) {
-  Session<S> session(test.scene, {&entry, params, entry.info.topology.preferred}, CountingPolicy::counting);
+  Session<S> session(test.scene, {&entry, params, entry.info.topology.preferred});
   return verify<S>(session, std::span<const double>(test.frames), shared_oracle(test), nullptr,
                    {.every_nth_frame = every, .areas = Areas::left_out});
 }
@@ -98,7 +98,7 @@ void expect_known_errors() {
     sum += one.depth;
   }
   ASSERT_GT(lost, 5u);
-  const Verification found = verified(make_counting_entry<Loses>(info()), test);
+  const Verification found = verified(make_entry<Loses>(info()), test);
   EXPECT_EQ(found.pairs, pairs);
   EXPECT_EQ(found.missed, lost);
   EXPECT_EQ(found.extra, 0u);
@@ -112,13 +112,13 @@ void expect_known_errors() {
   EXPECT_TRUE(found.holds()) << "an approximate contestant promises nothing";
 
   // Frames are counted, not comparisons.
-  const Verification sampled = verified(make_counting_entry<Loses>(info()), test, 5);
+  const Verification sampled = verified(make_entry<Loses>(info()), test, 5);
   ASSERT_TRUE(sampled.first_missed.has_value());
   EXPECT_EQ(*sampled.first_missed % 5, 0u);
   EXPECT_GE(*sampled.first_missed, first);
   EXPECT_LT(sampled.missed, lost);
 
-  const Verification added = verified(make_counting_entry<Adds>(info()), test);
+  const Verification added = verified(make_entry<Adds>(info()), test);
   EXPECT_EQ(added.missed, 0u);
   EXPECT_FALSE(added.first_missed.has_value());
   EXPECT_GT(added.extra, 5u);

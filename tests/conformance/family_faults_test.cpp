@@ -38,12 +38,12 @@ enum class Fault : std::uint8_t {
 };
 
 /// Boxes linear in time, one query a frame.
-template <class S, class Count, Fault fault>
-class Linear : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
+template <class S, Fault fault>
+class Linear : public CountedStrategy<S>, public TakesPlanChanges<S> {
  public:
   static constexpr Foresight foresight = Foresight::next_keyframe;
   Linear(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies, const Params&)
-      : CountedStrategy<S, Count>(scene, motion),
+      : CountedStrategy<S>(scene, motion),
         bounds_(scene, motion, std::move(topologies), active_kernel_set(), {}),
         stale_(scene.body_count()) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body)
@@ -102,12 +102,12 @@ class Linear : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
 };
 
 /// One join for each segment, from which frames are read; with span tests where all bodies are triangles.
-template <class S, class Count, Fault fault>
-class Join : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
+template <class S, Fault fault>
+class Join : public CountedStrategy<S>, public TakesPlanChanges<S> {
  public:
   static constexpr Foresight foresight = Foresight::next_keyframe;
   Join(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies, const Params&)
-      : CountedStrategy<S, Count>(scene, motion),
+      : CountedStrategy<S>(scene, motion),
         bounds_(scene, motion, std::move(topologies), active_kernel_set(), {}) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body)
       triangles_ = triangles_ && all_triangles(scene.primitives(body));
@@ -163,9 +163,9 @@ class Join : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
 };
 
 /// One list of near pairs for all frames that the motion's bound allows.
-template <class S, class Count, Fault fault>
-class Near : public StoredHierarchyStrategy<S, Count> {
-  using Base = StoredHierarchyStrategy<S, Count>;
+template <class S, Fault fault>
+class Near : public StoredHierarchyStrategy<S> {
+  using Base = StoredHierarchyStrategy<S>;
 
  public:
   static constexpr Foresight foresight = Foresight::step_bound;
@@ -233,9 +233,9 @@ class Near : public StoredHierarchyStrategy<S, Count> {
 };
 
 /// A refit that answers sweeps by boxes over both ends of the motion.
-template <class S, class Count, Fault fault>
-class Sweep : public StoredHierarchyStrategy<S, Count>, public AnswersSweeps<S> {
-  using Base = StoredHierarchyStrategy<S, Count>;
+template <class S, Fault fault>
+class Sweep : public StoredHierarchyStrategy<S>, public AnswersSweeps<S> {
+  using Base = StoredHierarchyStrategy<S>;
 
  public:
   static constexpr Foresight foresight = Foresight::none;
@@ -287,16 +287,16 @@ struct HalvesBuilder {
   std::uint32_t builds = 0;
   std::vector<KeyRange> parts;
 };
-template <class S, class Count, Fault fault>
-using Built = BuiltStrategy<S, Count, HalvesBuilder<S, fault>>;
+template <class S, Fault fault>
+using Built = BuiltStrategy<S, HalvesBuilder<S, fault>>;
 
 /// A sweep on one axis.
-template <class S, class Count, Fault fault>
-class AxisSweep : public CountedStrategy<S, Count> {
+template <class S, Fault fault>
+class AxisSweep : public CountedStrategy<S> {
  public:
   static constexpr Foresight foresight = Foresight::none;
   AxisSweep(const SceneView<S>& scene, const SampledMotion<S>& motion, const Topologies&, const Params&)
-      : CountedStrategy<S, Count>(scene, motion), bodies_(scene.body_count()), found_(sweep_block) {}
+      : CountedStrategy<S>(scene, motion), bodies_(scene.body_count()), found_(sweep_block) {}
   void reset_to(double /*t*/) override {
     for (std::uint32_t body = 0; body < bodies_.size(); ++body) {
       bodies_[body].start(PrimitiveList(this->scene_.primitives(body)), active_kernel_set());
@@ -341,30 +341,30 @@ class AxisSweep : public CountedStrategy<S, Count> {
   std::vector<FoundPair> found_;
 };
 
-template <template <class, class, Fault> class Family, Fault fault>
+template <template <class, Fault> class Family, Fault fault>
 struct With {
-  template <class S, class Count>
-  using Strategy = Family<S, Count, fault>;
+  template <class S>
+  using Strategy = Family<S, fault>;
 };
 
-template <template <class, class, Fault> class Family, Fault fault>
+template <template <class, Fault> class Family, Fault fault>
 StrategyEntry entry_of() {
   Info info;
   info.id = "faulty";
   info.tightness = Tightness::conservative;
   info.topology.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 4};
-  return make_counting_entry<With<Family, fault>::template Strategy>(info);
+  return make_entry<With<Family, fault>::template Strategy>(info);
 }
 
 /// The first violation in float and in double.
-template <template <class, class, Fault> class Family, Fault fault>
+template <template <class, Fault> class Family, Fault fault>
 std::pair<std::string, std::string> violations(const char* scene, std::uint32_t l = 7) {
   const StrategyEntry entry = entry_of<Family, fault>();
   const BuilderConfig& builder = entry.info.topology.preferred;
   return {check(entry, synthetic_scene<float>(scene, l), l, {}, builder),
           check(entry, synthetic_scene<double>(scene, l), l, {}, builder)};
 }
-template <template <class, class, Fault> class Family>
+template <template <class, Fault> class Family>
 void expect_sound(std::initializer_list<const char*> scenes) {
   for (const char* const scene : scenes) {
     const auto [in_float, in_double] = violations<Family, Fault::none>(scene);
@@ -372,7 +372,7 @@ void expect_sound(std::initializer_list<const char*> scenes) {
     EXPECT_EQ(in_double, "") << scene;
   }
 }
-template <template <class, class, Fault> class Family, Fault fault>
+template <template <class, Fault> class Family, Fault fault>
 void expect_caught(const char* scene, const std::string& expected) {
   const auto [in_float, in_double] = violations<Family, fault>(scene);
   EXPECT_NE(in_float.find(expected), std::string::npos) << "in float: " << in_float;
@@ -452,7 +452,7 @@ template <class S, Fault fault>
 std::size_t missed_contacts(const char* name) {
   const auto test = synthetic_scene<S>(name);
   const StrategyEntry entry = entry_of<Sweep, fault>();
-  Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::counting);
+  Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred});
   ContactFinder<S> finder(test.scene);
   Playback<S> playback(test.scene);
   const std::vector<double> knots = overlaid_keyframes(test.scene);

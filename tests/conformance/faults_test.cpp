@@ -26,9 +26,9 @@ enum class Fault {
   wrong_order,    // pairs reported with the bodies exchanged
 };
 
-template <class S, class Count, Fault fault>
-class FaultyRefit : public StoredHierarchyStrategy<S, Count> {
-  using Base = StoredHierarchyStrategy<S, Count>;
+template <class S, Fault fault>
+class FaultyRefit : public StoredHierarchyStrategy<S> {
+  using Base = StoredHierarchyStrategy<S>;
 
  public:
   static constexpr Foresight foresight = Foresight::none;
@@ -71,44 +71,44 @@ class FaultyRefit : public StoredHierarchyStrategy<S, Count> {
   std::uint64_t frame_ = 0;
 };
 
-template <class S, class C>
-using Sound = FaultyRefit<S, C, Fault::none>;
-template <class S, class C>
-using OneUlp = FaultyRefit<S, C, Fault::one_ulp>;
-template <class S, class C>
-using DroppedChild = FaultyRefit<S, C, Fault::dropped_child>;
-template <class S, class C>
-using StaleFrame = FaultyRefit<S, C, Fault::stale_frame>;
-template <class S, class C>
-using SwappedAxis = FaultyRefit<S, C, Fault::swapped_axis>;
-template <class S, class C>
-using RepeatedPair = FaultyRefit<S, C, Fault::repeated_pair>;
-template <class S, class C>
-using LostPair = FaultyRefit<S, C, Fault::lost_pair>;
-template <class S, class C>
-using TooLoose = FaultyRefit<S, C, Fault::too_loose>;
-template <class S, class C>
-using WrongOrder = FaultyRefit<S, C, Fault::wrong_order>;
+template <class S>
+using Sound = FaultyRefit<S, Fault::none>;
+template <class S>
+using OneUlp = FaultyRefit<S, Fault::one_ulp>;
+template <class S>
+using DroppedChild = FaultyRefit<S, Fault::dropped_child>;
+template <class S>
+using StaleFrame = FaultyRefit<S, Fault::stale_frame>;
+template <class S>
+using SwappedAxis = FaultyRefit<S, Fault::swapped_axis>;
+template <class S>
+using RepeatedPair = FaultyRefit<S, Fault::repeated_pair>;
+template <class S>
+using LostPair = FaultyRefit<S, Fault::lost_pair>;
+template <class S>
+using TooLoose = FaultyRefit<S, Fault::too_loose>;
+template <class S>
+using WrongOrder = FaultyRefit<S, Fault::wrong_order>;
 
 /// Pairs of leaves from boxes read off the realisers, without anything kept from frame to frame.
-template <class S, class Count, class Forest>
+template <class S, class Forest>
 QueryStatus implicit_candidates(const Forest& forest, const SceneView<S>& scene,
-                                const SampledMotion<S>& motion, std::vector<NodePair>& stack, Count& count,
-                                PairBuffer& out, const Budget& budget) {
+                                const SampledMotion<S>& motion, std::vector<NodePair>& stack, PairBuffer& out,
+                                const Budget& budget) {
+  std::uint64_t tests = 0;
   for (const BodyPair& pair : scene.pairs()) {
     const auto &a = forest.tree(pair.first), &b = forest.tree(pair.second);
     BoxCache<S> cache_a(a.topology().size()), cache_b(b.topology().size());
-    LeafPairs<S, Count> leaves(scene, motion, pair.first, a.topology(), pair.second, b.topology(), count,
-                               out);
+    LeafPairs<S> leaves(scene, motion, pair.first, a.topology(), pair.second, b.topology(), tests, out);
     RealiserBoxes<S> boxes_a(a.realisers(0), motion, pair.first, cache_a);
     RealiserBoxes<S> boxes_b(b.realisers(0), motion, pair.second, cache_b);
-    traverse(a.topology(), boxes_a, b.topology(), boxes_b, stack, count, budget, leaves);
+    traverse(a.topology(), boxes_a, b.topology(), boxes_b, stack, tests, budget, leaves);
   }
   return {};
 }
 
 /// A kinetic tree that loses one event: it leaves the queue and nobody handles it.
-template <class S, class Count>
+template <class S>
 class LostEvent : public Strategy<S> {
  public:
   static constexpr Foresight foresight = Foresight::whole_clip;
@@ -123,7 +123,7 @@ class LostEvent : public Strategy<S> {
         forest_.handle_next();
   }
   QueryStatus find_candidates(double, PairBuffer& out, const Budget& budget) override {
-    return implicit_candidates<S, Count>(forest_, this->scene_, this->sampled_, stack_, count_, out, budget);
+    return implicit_candidates<S>(forest_, this->scene_, this->sampled_, stack_, out, budget);
   }
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
     AuditView view{forest_.tree(body).topology(), {}, {}};
@@ -135,8 +135,8 @@ class LostEvent : public Strategy<S> {
   std::size_t bytes() const override { return forest_.bytes(); }
 
  private:
-  Count count_;
-  KineticForest<S, AvlQueue<S>, Count> forest_;
+  Counters count_;
+  KineticForest<S, AvlQueue<S>> forest_;
   std::vector<NodePair> stack_;
   std::uint64_t events_ = 0;
 };
@@ -148,9 +148,9 @@ enum class LazyFault : std::uint8_t {
 };
 
 /// Inflated boxes that wait for the bound on the motion, in their simplest form.
-template <class S, class Count, LazyFault fault>
-class FaultyMargin : public StoredHierarchyStrategy<S, Count> {
-  using Base = StoredHierarchyStrategy<S, Count>;
+template <class S, LazyFault fault>
+class FaultyMargin : public StoredHierarchyStrategy<S> {
+  using Base = StoredHierarchyStrategy<S>;
 
  public:
   static constexpr Foresight foresight = Foresight::step_bound;
@@ -193,18 +193,18 @@ class FaultyMargin : public StoredHierarchyStrategy<S, Count> {
   std::vector<double> moved_;
   double last_ = 0;
 };
-template <class S, class C>
-using SoundMargin = FaultyMargin<S, C, LazyFault::none>;
-template <class S, class C>
-using SmallMargin = FaultyMargin<S, C, LazyFault::small_margin>;
-template <class S, class C>
-using HalfBound = FaultyMargin<S, C, LazyFault::half_bound>;
+template <class S>
+using SoundMargin = FaultyMargin<S, LazyFault::none>;
+template <class S>
+using SmallMargin = FaultyMargin<S, LazyFault::small_margin>;
+template <class S>
+using HalfBound = FaultyMargin<S, LazyFault::half_bound>;
 
 /// Boxes below the root that are made when a query first asks; the fault takes back the mark of every fifth
 /// node and makes nothing.
-template <class S, class Count, LazyFault fault>
-class FaultyLazy : public StoredHierarchyStrategy<S, Count> {
-  using Base = StoredHierarchyStrategy<S, Count>;
+template <class S, LazyFault fault>
+class FaultyLazy : public StoredHierarchyStrategy<S> {
+  using Base = StoredHierarchyStrategy<S>;
 
  public:
   static constexpr Foresight foresight = Foresight::none;
@@ -254,10 +254,10 @@ class FaultyLazy : public StoredHierarchyStrategy<S, Count> {
   std::vector<std::vector<std::uint8_t>> stale_;
   std::uint64_t made_ = 0;
 };
-template <class S, class C>
-using SoundLazy = FaultyLazy<S, C, LazyFault::none>;
-template <class S, class C>
-using ForgetfulLazy = FaultyLazy<S, C, LazyFault::half_bound>;
+template <class S>
+using SoundLazy = FaultyLazy<S, LazyFault::none>;
+template <class S>
+using ForgetfulLazy = FaultyLazy<S, LazyFault::half_bound>;
 /// Forgets certificates near the root while the switch is on: nobody watches them from then on.
 template <class S>
 class ForgetfulQueue : public AvlQueue<S> {
@@ -271,7 +271,7 @@ class ForgetfulQueue : public AvlQueue<S> {
 
 /// A kinetic tree that, when geometry changes, repairs leaves and what is near them, but not the certificates
 /// of the ancestors far above.
-template <class S, class Count, bool faulty>
+template <class S, bool faulty>
 class LocalRepair : public Strategy<S>, public TakesGeometryChanges<S> {
  public:
   static constexpr Foresight foresight = Foresight::whole_clip;
@@ -285,7 +285,7 @@ class LocalRepair : public Strategy<S>, public TakesGeometryChanges<S> {
     forest_.queue().forgets = false;
   }
   QueryStatus find_candidates(double, PairBuffer& out, const Budget& budget) override {
-    return implicit_candidates<S, Count>(forest_, this->scene_, this->sampled_, stack_, count_, out, budget);
+    return implicit_candidates<S>(forest_, this->scene_, this->sampled_, stack_, out, budget);
   }
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
     std::vector<std::uint32_t> order;
@@ -299,14 +299,14 @@ class LocalRepair : public Strategy<S>, public TakesGeometryChanges<S> {
 
  private:
   ClipMotion<S> motion_;
-  Count count_;
-  KineticForest<S, ForgetfulQueue<S>, Count> forest_;
+  Counters count_;
+  KineticForest<S, ForgetfulQueue<S>> forest_;
   std::vector<NodePair> stack_;
 };
-template <class S, class C>
-using RepairsAll = LocalRepair<S, C, false>;
-template <class S, class C>
-using ForgetsAncestors = LocalRepair<S, C, true>;
+template <class S>
+using RepairsAll = LocalRepair<S, false>;
+template <class S>
+using ForgetsAncestors = LocalRepair<S, true>;
 
 Info info(const char* id) {
   Info result;
@@ -315,10 +315,10 @@ Info info(const char* id) {
   return result;
 }
 
-template <template <class, class> class Strategy>
+template <template <class> class Strategy>
 std::string violation(const char* id, Tightness tightness = Tightness::tight, const char* scene = "soups",
                       std::uint32_t frames_per_keyframe = 7) {
-  StrategyEntry entry = make_counting_entry<Strategy>(info(id));
+  StrategyEntry entry = make_entry<Strategy>(info(id));
   entry.info.tightness = tightness;
   const BuilderConfig& builder = entry.info.topology.preferred;
   const std::uint32_t l = frames_per_keyframe;
@@ -383,11 +383,11 @@ TEST(Faults, LostEvent) {
   expect_caught(violation<LostEvent>("lost_event"), "protrudes");
 }
 
-template <template <class, class> class Strategy>
+template <template <class> class Strategy>
 std::string violation_with_changing_geometry(const char* id) {
   Info described = info(id);
   described.topology.preferred.leaf_size = 1;
-  const StrategyEntry entry = make_counting_entry<Strategy>(described);
+  const StrategyEntry entry = make_entry<Strategy>(described);
   const BuilderConfig builder = entry.info.topology.preferred;
   return check(entry, synthetic_scene<float>("geometry_changes_shared", 7), 7, {}, builder) + "|" +
          check(entry, synthetic_scene<double>("geometry_changes_shared", 7), 7, {}, builder);

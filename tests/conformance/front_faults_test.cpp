@@ -18,11 +18,11 @@ enum class FrontFault : std::uint8_t {
 
 template <FrontFault fault>
 struct Fronts {
-  template <class S, class Count>
-  class Strategy : public StoredHierarchyStrategy<S, Count> {
+  template <class S>
+  class Strategy : public StoredHierarchyStrategy<S> {
    public:
     static constexpr Foresight foresight = Foresight::none;
-    using StoredHierarchyStrategy<S, Count>::StoredHierarchyStrategy;
+    using StoredHierarchyStrategy<S>::StoredHierarchyStrategy;
     QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& /*none*/) override {
       for (FrontPair& entry : front_.entries()) {
         if (fault == FrontFault::no_descent) entry.met = ~std::uint64_t(0);
@@ -49,8 +49,8 @@ std::string violation(const char* scene) {
   Info info;
   info.id = "faulty";
   info.topology.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 4};
-  return check(make_counting_entry<Fronts<fault>::template Strategy>(info), synthetic_scene<S>(scene, 7), 7,
-               {}, info.topology.preferred);
+  return check(make_entry<Fronts<fault>::template Strategy>(info), synthetic_scene<S>(scene, 7), 7, {},
+               info.topology.preferred);
 }
 template <FrontFault fault>
 void expect_caught(const std::string& expected) {

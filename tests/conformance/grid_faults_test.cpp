@@ -17,12 +17,12 @@ enum class Fault : std::uint8_t {
 
 template <Fault fault>
 struct Seeded {
-  template <class S, class Count>
-  class Strategy : public CountedStrategy<S, Count> {
+  template <class S>
+  class Strategy : public CountedStrategy<S> {
    public:
     static constexpr Foresight foresight = Foresight::none;
     Strategy(const SceneView<S>& scene, const SampledMotion<S>& motion, const Topologies&, const Params&)
-        : CountedStrategy<S, Count>(scene, motion), bodies_(scene.body_count()) {
+        : CountedStrategy<S>(scene, motion), bodies_(scene.body_count()) {
       for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
         lists_.emplace_back(scene.primitives(body));
         if (fault == Fault::lost_primitive) --lists_.back().count;

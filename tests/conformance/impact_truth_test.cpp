@@ -78,7 +78,7 @@ TEST_P(FramePairs, ListedPairsAreFoundOrFree) {
     if (!entry.info.can.contacts || !entry.info.can.self_pairs || entry.info.max_primitive_pairs != 0)
       continue;
     ++strategies;
-    Session<double> session(scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+    Session<double> session(scene, {&entry, {}, entry.info.topology.preferred});
     session.reset(0);
     ContactBuffer contacts;
     PhaseTimes times_taken;

@@ -38,12 +38,12 @@ struct FaultyOrder {
 
 template <Fault fault, KeptBy kept>
 struct Seeded {
-  template <class S, class Count>
-  class Strategy : public CountedStrategy<S, Count>, public AnswersSelfPairs {
+  template <class S>
+  class Strategy : public CountedStrategy<S>, public AnswersSelfPairs {
    public:
     static constexpr Foresight foresight = Foresight::next_keyframe;
     Strategy(const SceneView<S>& scene, const SegmentMotion<S>& motion, const Topologies&, const Params&)
-        : CountedStrategy<S, Count>(scene, motion), motion_(motion) {
+        : CountedStrategy<S>(scene, motion), motion_(motion) {
       std::vector<std::uint32_t> body_of;
       for (std::uint32_t body = 0; body < scene.body_count(); ++body)
         for (std::uint32_t p = 0; p < scene.primitives(body).count(); ++p) {

@@ -46,7 +46,7 @@ class Faulty : public Base {
     }
   }
   static std::size_t find_pairs(Faulty& a, std::uint32_t body_a, Faulty& b, std::uint32_t body_b,
-                                typename Base::Scratch& scratch, BoxTests& tests, const Budget& budget,
+                                typename Base::Scratch& scratch, std::uint64_t& tests, const Budget& budget,
                                 PairBuffer& out) {
     const std::size_t before = out.size();
     const std::size_t pending = Base::find_pairs(a, body_a, b, body_b, scratch, tests, budget, out);
@@ -96,11 +96,11 @@ class Faulty : public Base {
 
 template <template <class> class Base, Fault fault>
 struct FaultyStrategy {
-  template <class S, class Count>
-  class Strategy : public HierarchyStrategy<S, Count, Faulty<Base<S>, fault>> {
+  template <class S>
+  class Strategy : public HierarchyStrategy<S, Faulty<Base<S>, fault>> {
    public:
     Strategy(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies, const Params&)
-        : HierarchyStrategy<S, Count, Faulty<Base<S>, fault>>(scene, motion, std::move(topologies), 0) {}
+        : HierarchyStrategy<S, Faulty<Base<S>, fault>>(scene, motion, std::move(topologies), 0) {}
   };
 };
 template <class S>
@@ -115,8 +115,7 @@ std::string violation() {
   info.tightness = Tightness::conservative;
   info.topology.widths = {8};
   info.topology.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 2};
-  const StrategyEntry entry =
-      make_counting_entry<FaultyStrategy<Base, fault>::template Strategy>(std::move(info));
+  const StrategyEntry entry = make_entry<FaultyStrategy<Base, fault>::template Strategy>(std::move(info));
   return check(entry, synthetic_scene<float>("soups", 7), 7, {}, entry.info.topology.preferred);
 }
 

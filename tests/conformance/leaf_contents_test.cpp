@@ -193,11 +193,9 @@ TEST(MedianSort, TakesEqualKeysAndOneItem) {
 enum class Fault : std::uint8_t { none, boxes_before, lost_primitive };
 
 /// Sorts all primitives, and renews a third of the leaves, in turn.
-template <class S, class Count, Fault fault>
-class Sorting : public StoredHierarchyStrategy<S, Count>,
-                public AnswersSelfPairs,
-                public TakesGeometryChanges<S> {
-  using Base = StoredHierarchyStrategy<S, Count>;
+template <class S, Fault fault>
+class Sorting : public StoredHierarchyStrategy<S>, public AnswersSelfPairs, public TakesGeometryChanges<S> {
+  using Base = StoredHierarchyStrategy<S>;
 
  public:
   static constexpr Foresight foresight = Foresight::none;
@@ -234,8 +232,8 @@ class Sorting : public StoredHierarchyStrategy<S, Count>,
 };
 template <Fault fault>
 struct With {
-  template <class S, class Count>
-  using Strategy = Sorting<S, Count, fault>;
+  template <class S>
+  using Strategy = Sorting<S, fault>;
 };
 template <Fault fault>
 StrategyEntry entry() {

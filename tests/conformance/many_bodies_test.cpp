@@ -66,7 +66,7 @@ TEST(ManyBodies, SeparationListNumbersMoreThan65535BodyPairs) {
   Scene<float> scene = many_bodies<float>(400, 1);
   for (const char* id : {"kinetic_separation_list"}) {
     const StrategyEntry& entry = find_strategy(id);
-    Session<float> session(scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+    Session<float> session(scene, {&entry, {}, entry.info.topology.preferred});
     PhaseTimes ignored;
     PairBuffer pairs;
     session.reset(0);
@@ -101,7 +101,7 @@ TEST(ManyBodies, EventsNumberMoreThan65535Bodies) {
     if (!entry.info.can.event_driven || entry.info.foresight != Foresight::whole_clip ||
         entry.info.guarantee != Guarantee::exact || entry.factory<float>() == nullptr)
       continue;
-    Session<float> session(scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+    Session<float> session(scene, {&entry, {}, entry.info.topology.preferred});
     PhaseTimes ignored;
     PairBuffer pairs;
     session.reset(0);
@@ -168,7 +168,7 @@ TEST_P(ManyBodiesOf, CostWhatBodiesCostAndNotTheirPairs) {
   const auto cost_of = [&](std::uint32_t bodies) {
     Cost cost;
     const Scene<float> scene = many_bodies<float>(bodies, 8);
-    Session<float> session(scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::counting);
+    Session<float> session(scene, {&entry, {}, entry.info.topology.preferred});
     PhaseTimes ignored;
     PairBuffer pairs;
     session.reset(0);

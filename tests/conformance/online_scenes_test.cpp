@@ -56,7 +56,7 @@ void every_strategy_equals_the_oracle(const Size& size) {
   for (const StrategyEntry& entry : registry()) {
     if (!entry.info.can.plan_changes || entry.factory<S>() == nullptr) continue;
     if (entry.info.max_primitive_pairs != 0 && size.triangles > 1000) continue;
-    Session<S> session(scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::counting);
+    Session<S> session(scene, {&entry, {}, entry.info.topology.preferred});
     const auto begin = std::chrono::steady_clock::now();
     const Verification result = verify(session, std::span<const double>(frames), oracle, &script);
     EXPECT_EQ(result.first_violation, "") << entry.info.id << " on " << scene.name;

@@ -196,8 +196,8 @@ TEST_P(PlanChanges, ErrorsChangeNothing) {
     if (entry.factory<S>() == nullptr) return;
     constexpr S infinity = std::numeric_limits<S>::infinity(), nan = std::numeric_limits<S>::quiet_NaN();
     const Contestant contestant{&entry, {}, entry.info.topology.preferred};
-    Session<S> session(test.scene, contestant, CountingPolicy::silent);
-    Session<S> other(test.scene, contestant, CountingPolicy::silent);  // nobody asks it for changes
+    Session<S> session(test.scene, contestant);
+    Session<S> other(test.scene, contestant);  // nobody asks it for changes
     Playback<S> undisturbed(test.scene);
     PairBuffer pairs, expected;
     PhaseTimes times;
@@ -247,7 +247,7 @@ TEST_P(PlanChanges, ResetForgetsThem) {
   const auto run = [&](const auto& test) {
     using S = KBVH_SCALAR(test);
     if (entry.factory<S>() == nullptr) return;
-    Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+    Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred});
     Oracle<S> with(test.scene, {}, hash(test.script)), without(test.scene);
     const std::span<const double> frames(test.frames);
     const Verification first = verify(session, frames, with, &test.script);

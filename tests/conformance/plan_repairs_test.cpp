@@ -23,12 +23,12 @@ enum class Fault : std::uint8_t {
   span_not_cut,   // what was proved of a pair before the change is reported after it
 };
 
-template <class S, class Count, Fault fault>
-class Repaired : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
+template <class S, Fault fault>
+class Repaired : public CountedStrategy<S>, public TakesPlanChanges<S> {
  public:
   static constexpr Foresight foresight = Foresight::next_keyframe;
   Repaired(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies, const Params&)
-      : CountedStrategy<S, Count>(scene, motion),
+      : CountedStrategy<S>(scene, motion),
         bounds_(scene, motion, std::move(topologies), active_kernel_set(), {}) {
     join_.use_slabs();
   }
@@ -128,8 +128,8 @@ class Repaired : public CountedStrategy<S, Count>, public TakesPlanChanges<S> {
 
 template <Fault fault>
 struct With {
-  template <class S, class Count>
-  using Strategy = Repaired<S, Count, fault>;
+  template <class S>
+  using Strategy = Repaired<S, fault>;
 };
 
 /// Small triangles that hover about a sheet of large ones: all slide along a tilted plane, and at every frame
@@ -200,7 +200,7 @@ std::string violation(std::uint64_t& kept, const TestScene<S>& test) {
   info.tightness = Tightness::conservative;
   info.topology.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 4};
   const StrategyEntry entry = make_entry<With<fault>::template Strategy>(info);
-  Session<S> session(test.scene, {&entry, {}, info.topology.preferred}, CountingPolicy::counting);
+  Session<S> session(test.scene, {&entry, {}, info.topology.preferred});
   const Verification result =
       verify(session, std::span<const double>(test.frames.empty() ? frame_times(test.scene, 7) : test.frames),
              shared_oracle(test), &test.script);

@@ -103,7 +103,7 @@ class Primitives : public testing::TestWithParam<std::string> {
     if (entry.factory<S>() == nullptr) return;
     const Scene<S> scene = experiments::assemble<S>(surface_and_sphere(surface));
     if (!unsuitable_bodies(entry.info, scene).empty()) return;
-    Session<S> session(scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+    Session<S> session(scene, {&entry, {}, entry.info.topology.preferred});
     PhaseTimes times;
     PairBuffer pairs;
     const auto spans = io::spans_of(surface.spline.knots_u, surface.spline.degree_u, surface.spline.first_u,

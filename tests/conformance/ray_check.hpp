@@ -54,7 +54,7 @@ std::string rays_violation(const StrategyEntry& entry, const TestScene<S>& test,
                            const std::map<std::string, std::string>& params, Truth<S>& truth,
                            std::uint64_t& hits) {
   if (!skipped(entry, test).empty() || !unsuitable_bodies(entry.info, test.scene).empty()) return {};
-  Session<S> session(test.scene, {&entry, params, builder}, CountingPolicy::counting);
+  Session<S> session(test.scene, {&entry, params, builder});
   const std::vector<double> frames = some_frames(test);
   ScriptCursor<S> cursor(test.script.steps.empty() ? nullptr : &test.script);
   PhaseTimes ignored;

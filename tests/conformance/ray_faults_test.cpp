@@ -46,15 +46,15 @@ bool meets(const Ray<S>& ray, const Box<S>& box, double limit, Fault fault) {
   return fault == Fault::open_slabs ? first < last : first <= last;
 }
 
-template <class S, class Count, Fault fault>
-class Simple : public CountedStrategy<S, Count>,
+template <class S, Fault fault>
+class Simple : public CountedStrategy<S>,
                public AnswersRays<S>,
                public AnswersSelfPairs,
                public TakesPlanChanges<S> {
  public:
   static constexpr Foresight foresight = Foresight::none;
   Simple(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies, const Params&)
-      : CountedStrategy<S, Count>(scene, motion), topologies_(std::move(topologies)) {}
+      : CountedStrategy<S>(scene, motion), topologies_(std::move(topologies)) {}
   std::size_t bytes() const override { return 0; }
 
  protected:
@@ -186,8 +186,8 @@ class Simple : public CountedStrategy<S, Count>,
 
 template <Fault fault>
 struct With {
-  template <class S, class Count>
-  using Strategy = Simple<S, Count, fault>;
+  template <class S>
+  using Strategy = Simple<S, fault>;
 };
 
 /// Returns the first violation on some scenes, in float and double.
@@ -196,7 +196,7 @@ std::string first_violation() {
   Info info;
   info.id = "simple";
   info.guarantee = Guarantee::approximate;  // of pairs, which it does not find
-  const StrategyEntry entry = make_counting_entry<With<fault>::template Strategy>(info);
+  const StrategyEntry entry = make_entry<With<fault>::template Strategy>(info);
   const BuilderConfig builder{.method = BuildMethod::median, .width = 2, .leaf_size = 2};
   std::uint64_t hits = 0;
   for (const char* name : {"soups", "polygons", "sheets", "integer_ties"}) {

@@ -117,7 +117,7 @@ TEST(RaysOfStrategies, AreAnsweredByAllWithAHierarchyOfBoxes) {
 TEST(RaysOfStrategies, AreCheckedBeforeTheyAreFollowed) {
   const auto test = synthetic_scene<float>("soups");
   const StrategyEntry& entry = find_strategy("bottom_up");
-  Session<float> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+  Session<float> session(test.scene, {&entry, {}, entry.info.topology.preferred});
   PhaseTimes ignored;
   session.reset(frame_times(test.scene, 1)[0]);
   const std::vector<Ray<float>> one{{{0, 0, 0}, {1, 0, 0}}};

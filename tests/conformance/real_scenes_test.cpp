@@ -36,7 +36,7 @@ class RealScenes : public testing::TestWithParam<RealScene> {
       if (entry.factory<S>() == nullptr) continue;
       if (has_self_pairs(scene.pairs) && !entry.info.can.self_pairs) continue;
       if (entry.info.max_primitive_pairs != 0 && slow()) continue;  // quadratic: quick scenes only
-      Session<S> session(scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::counting);
+      Session<S> session(scene, {&entry, {}, entry.info.topology.preferred});
       const Verification result = verify(session, std::span<const double>(frames), oracle);
       EXPECT_EQ(result.first_violation, "") << entry.info.id << " on " << scene.name << ", l = " << l;
       if (entry.info.guarantee != Guarantee::approximate) {

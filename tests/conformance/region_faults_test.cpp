@@ -21,9 +21,9 @@ enum class RegionFault : std::uint8_t {
 
 template <RegionFault fault>
 struct Regions {
-  template <class S, class Count>
-  class Strategy : public StoredHierarchyStrategy<S, Count> {
-    using Base = StoredHierarchyStrategy<S, Count>;
+  template <class S>
+  class Strategy : public StoredHierarchyStrategy<S> {
+    using Base = StoredHierarchyStrategy<S>;
 
    public:
     static constexpr Foresight foresight = Foresight::whole_clip;
@@ -101,7 +101,7 @@ std::string violation(std::uint32_t width) {
   Info info;
   info.id = "faulty";
   info.topology.preferred = {.method = BuildMethod::median, .width = width, .leaf_size = 2};
-  return check(make_counting_entry<Regions<fault>::template Strategy>(info), moving_in_places<S>(), 7, {},
+  return check(make_entry<Regions<fault>::template Strategy>(info), moving_in_places<S>(), 7, {},
                info.topology.preferred);
 }
 template <RegionFault fault>

@@ -52,15 +52,13 @@ enum class MoveFault : std::uint8_t {
 
 template <MoveFault fault>
 struct Moving {
-  template <class S, class Count>
-  class Strategy : public CountedStrategy<S, Count>, public AnswersSelfPairs {
+  template <class S>
+  class Strategy : public CountedStrategy<S>, public AnswersSelfPairs {
    public:
     static constexpr Foresight foresight = Foresight::none;
     Strategy(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
              const Params& /*params*/)
-        : CountedStrategy<S, Count>(scene, motion),
-          start_(std::move(topologies)),
-          trees_(scene.body_count()) {}
+        : CountedStrategy<S>(scene, motion), start_(std::move(topologies)), trees_(scene.body_count()) {}
     void reset_to(double /*t*/) override {
       for (std::uint32_t body = 0; body < trees_.size(); ++body) {
         trees_[body].assign(start_[body], this->scene_.primitives(body), active_kernel_set());
@@ -124,8 +122,8 @@ std::string violation(const char* scene, std::uint32_t leaf_size) {
   info.id = "moving";
   info.declares = {.restructures = true};
   info.topology.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = leaf_size};
-  return check(make_counting_entry<Moving<fault>::template Strategy>(info), synthetic_scene<S>(scene, 7), 7,
-               {}, info.topology.preferred);
+  return check(make_entry<Moving<fault>::template Strategy>(info), synthetic_scene<S>(scene, 7), 7, {},
+               info.topology.preferred);
 }
 template <MoveFault fault>
 void expect_caught(const std::string& expected) {

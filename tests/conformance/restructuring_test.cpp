@@ -54,7 +54,7 @@ TEST_P(Restructuring, HappensAndIsTakenBackByReset) {
   const StrategyEntry& entry = find_strategy(one.id);
   const auto test = synthetic_scene<float>("soups", 7);
   const BuilderConfig builder{.method = BuildMethod::median, .width = 8, .leaf_size = 1};
-  Session<float> session(test.scene, {&entry, one.params, builder}, CountingPolicy::counting);
+  Session<float> session(test.scene, {&entry, one.params, builder});
   PhaseTimes times;
   PairBuffer pairs;
   std::vector<std::size_t> found[2];
@@ -86,7 +86,7 @@ TEST_P(Restructuring, HappensAndIsTakenBackByReset) {
 /// Plays a clip in which nothing is asked but rays; returns the box tests of the last frame.
 std::uint64_t last_tests_of_rays(const Scene<float>& scene, const std::string& id,
                                  std::vector<RayHit>& hits) {
-  Session<float> session(scene, {&find_strategy(id), {}, {}}, CountingPolicy::counting);
+  Session<float> session(scene, {&find_strategy(id), {}, {}});
   session.reset(0);
   std::mt19937 random(5);
   std::vector<Ray<float>> rays(1000);
@@ -124,7 +124,7 @@ TEST(Restructuring, SortsTheTreesOfTheFirstFrame) {
   PairBuffer found[2];
   for (const bool sorted : {false, true}) {
     const std::map<std::string, std::string> params{{"start", sorted ? "sorted" : "given"}};
-    Session<float> session(scene, {&find_strategy("drift_rebuild"), params, {}}, CountingPolicy::counting);
+    Session<float> session(scene, {&find_strategy("drift_rebuild"), params, {}});
     PhaseTimes times;
     session.reset(30);
     session.query(found[sorted], times);

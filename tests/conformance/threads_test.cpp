@@ -62,7 +62,7 @@ std::vector<std::uint64_t> answers(const StrategyEntry& entry, const Scene<S>& s
                                    std::map<std::string, std::string> params, std::uint32_t threads,
                                    const BuilderConfig& builder) {
   params["threads"] = std::to_string(threads);
-  Session<S> session(scene, {&entry, params, builder}, CountingPolicy::counting);
+  Session<S> session(scene, {&entry, params, builder});
   EXPECT_EQ(session.playback().workers().threads(), threads);
   std::vector<std::uint64_t> hashes;
   PairBuffer pairs, begun, ended;

@@ -41,9 +41,9 @@ enum class Fault : std::uint8_t { none, shrunk };
 enum class Shown : std::uint8_t { volumes, boxes };
 
 /// Shrinks all volumes whose enclosing boxes do not give it away.
-template <class S, class Count, class V, Fault fault, Shown shown>
-class FaultyVolumes : public VolumeStrategy<S, Count, V> {
-  using Base = VolumeStrategy<S, Count, V>;
+template <class S, class V, Fault fault, Shown shown>
+class FaultyVolumes : public VolumeStrategy<S, V> {
+  using Base = VolumeStrategy<S, V>;
 
  public:
   FaultyVolumes(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
@@ -85,8 +85,8 @@ class FaultyVolumes : public VolumeStrategy<S, Count, V> {
 
 template <template <class> class V, Fault fault, Shown shown>
 struct Faulty {
-  template <class S, class C>
-  using Strategy = FaultyVolumes<S, C, V<S>, fault, shown>;
+  template <class S>
+  using Strategy = FaultyVolumes<S, V<S>, fault, shown>;
 };
 template <class S>
 using Dop18 = Dop<S, 18>;
@@ -97,8 +97,7 @@ std::string violation() {
   info.id = "faulty_volumes";
   info.tightness = Tightness::conservative;
   info.topology.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 2};
-  const StrategyEntry entry =
-      make_counting_entry<Faulty<V, fault, shown>::template Strategy>(std::move(info));
+  const StrategyEntry entry = make_entry<Faulty<V, fault, shown>::template Strategy>(std::move(info));
   const BuilderConfig builder = entry.info.topology.preferred;
   return check(entry, synthetic_scene<float>("soups", 7), 7, {}, builder) + "|" +
          check(entry, synthetic_scene<double>("soups", 7), 7, {}, builder);
@@ -221,7 +220,7 @@ class FaultyDops : public DopHierarchy<S, 18> {
   }
   template <class OnLeaves>
   static std::size_t search(const FaultyDops& a, const FaultyDops& b, typename Base::Scratch& scratch,
-                            BoxTests& tests, const Budget& budget, OnLeaves&& on_leaves) {
+                            std::uint64_t& tests, const Budget& budget, OnLeaves&& on_leaves) {
     std::size_t met = 0;
     return Base::search(a, b, scratch, tests, budget, [&](std::uint32_t p, std::uint32_t q) {
       if (fault != DopFault::forgetful || ++met % 20 != 0) on_leaves(p, q);
@@ -234,11 +233,11 @@ class FaultyDops : public DopHierarchy<S, 18> {
 };
 template <DopFault fault>
 struct FaultyKdop {
-  template <class S, class Count>
-  class Strategy : public HierarchyStrategy<S, Count, FaultyDops<S, fault>> {
+  template <class S>
+  class Strategy : public HierarchyStrategy<S, FaultyDops<S, fault>> {
    public:
     Strategy(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies, const Params&)
-        : HierarchyStrategy<S, Count, FaultyDops<S, fault>>(scene, motion, std::move(topologies), 0) {}
+        : HierarchyStrategy<S, FaultyDops<S, fault>>(scene, motion, std::move(topologies), 0) {}
   };
 };
 template <DopFault fault>
@@ -247,7 +246,7 @@ std::string kdop_violation() {
   info.id = "faulty_kdop";
   info.tightness = Tightness::conservative;
   info.topology.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 2};
-  const StrategyEntry entry = make_counting_entry<FaultyKdop<fault>::template Strategy>(std::move(info));
+  const StrategyEntry entry = make_entry<FaultyKdop<fault>::template Strategy>(std::move(info));
   return check(entry, synthetic_scene<float>("soups", 7), 7, {}, entry.info.topology.preferred);
 }
 

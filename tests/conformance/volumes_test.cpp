@@ -59,8 +59,7 @@ TEST(EveryVolume, OfFixedDirectionsIsTight) {
     for (const std::string scene : {"soups", "sheets", "pure_translation_far", "integer_ties"}) {
       const auto test = synthetic_scene<float>(scene, 3);
       const StrategyEntry& entry = find_strategy("bottom_up_volumes");
-      Session<float> session(test.scene, {&entry, {{"volume", volume}}, entry.info.topology.preferred},
-                             CountingPolicy::silent);
+      Session<float> session(test.scene, {&entry, {{"volume", volume}}, entry.info.topology.preferred});
       Oracle<float> oracle(test.scene);
       const Verification result = verify(session, std::span<const double>(test.frames), oracle);
       EXPECT_TRUE(result.audited);
@@ -73,8 +72,8 @@ TEST(EveryVolume, BoxesAreThoseOfTheOtherRefit) {
   const auto test = synthetic_scene<double>("soups", 3);
   const BuilderConfig builder{.method = BuildMethod::median, .width = 2, .leaf_size = 2};
   const StrategyEntry &plain = find_strategy("bottom_up_volumes"), &fast = find_strategy("bottom_up");
-  Session<double> one(test.scene, {&plain, {{"volume", "aabb"}}, builder}, CountingPolicy::silent);
-  Session<double> other(test.scene, {&fast, {}, builder}, CountingPolicy::silent);
+  Session<double> one(test.scene, {&plain, {{"volume", "aabb"}}, builder});
+  Session<double> other(test.scene, {&fast, {}, builder});
   PhaseTimes times;
   one.reset(test.frames[0]);
   other.reset(test.frames[0]);
@@ -91,8 +90,7 @@ TEST(EveryVolume, KDopsLeaveFewerCandidatesThanBoxes) {
   const auto candidates = [](const std::string& volume) {
     const auto test = synthetic_scene<float>("soups", 3);
     const StrategyEntry& entry = find_strategy("bottom_up_volumes");
-    Session<float> session(test.scene, {&entry, {{"volume", volume}}, entry.info.topology.preferred},
-                           CountingPolicy::silent);
+    Session<float> session(test.scene, {&entry, {{"volume", volume}}, entry.info.topology.preferred});
     Oracle<float> oracle(test.scene);
     return verify(session, std::span<const double>(test.frames), oracle).candidates;
   };
@@ -104,9 +102,9 @@ TEST(EveryVolume, KDopsLeaveFewerCandidatesThanBoxes) {
 
 /// Rotates a few random nodes of every body at each frame, after the refit: rotated volumes are what the
 /// query reads.
-template <class S, class Count, class V>
-class Rotating : public VolumeStrategy<S, Count, V> {
-  using Base = VolumeStrategy<S, Count, V>;
+template <class S, class V>
+class Rotating : public VolumeStrategy<S, V> {
+  using Base = VolumeStrategy<S, V>;
 
  public:
   Rotating(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies, const Params&)
@@ -135,16 +133,16 @@ class Rotating : public VolumeStrategy<S, Count, V> {
  public:
   static inline std::uint64_t rotations = 0;
 };
-template <class S, class C>
-using RotatingBoxes = Rotating<S, C, Box<S>>;
-template <class S, class C>
-using RotatingDops = Rotating<S, C, Dop<S, 18>>;
-template <class S, class C>
-using RotatingSpheres = Rotating<S, C, Sphere<S>>;
-template <class S, class C>
-using RotatingObbs = Rotating<S, C, Obb<S>>;
+template <class S>
+using RotatingBoxes = Rotating<S, Box<S>>;
+template <class S>
+using RotatingDops = Rotating<S, Dop<S, 18>>;
+template <class S>
+using RotatingSpheres = Rotating<S, Sphere<S>>;
+template <class S>
+using RotatingObbs = Rotating<S, Obb<S>>;
 
-template <template <class, class> class T>
+template <template <class> class T>
 StrategyEntry rotating(Tightness tightness) {
   Info info;
   info.id = "rotating";
@@ -158,7 +156,7 @@ StrategyEntry rotating(Tightness tightness) {
 class Rotations : public testing::TestWithParam<std::string> {};
 
 TEST_P(Rotations, AtEveryFrameKeepEveryGuarantee) {
-  RotatingBoxes<float, Counting>::rotations = 0;
+  RotatingBoxes<float>::rotations = 0;
   // Around the boxes of control nets, and of what meets them, k-DOPs are not those of the vertices.
   const bool nets = GetParam().find("points") != std::string::npos;
   const Tightness dops = nets ? Tightness::conservative : Tightness::tight;
@@ -169,7 +167,7 @@ TEST_P(Rotations, AtEveryFrameKeepEveryGuarantee) {
   }
   EXPECT_EQ(violations(rotating<RotatingObbs>(Tightness::conservative), GetParam(), 3, {}), "|");
   if (GetParam() == "soups" || GetParam() == "sheets") {
-    EXPECT_GT((RotatingBoxes<float, Counting>::rotations), 100u);
+    EXPECT_GT((RotatingBoxes<float>::rotations), 100u);
   }
 }
 

@@ -15,11 +15,11 @@ enum class Boxes : std::uint8_t { recomputed, as_before_the_edit };
 
 /// Edits every moving body at each frame, after the refit: rotates random nodes, regrows a subtree, and moves
 /// another one. The query reads the edited layout.
-template <class S, class Count, Boxes boxes>
-class Restructuring : public StoredHierarchyStrategy<S, Count>,
+template <class S, Boxes boxes>
+class Restructuring : public StoredHierarchyStrategy<S>,
                       public AnswersSelfPairs,
                       public TakesGeometryChanges<S> {
-  using Base = StoredHierarchyStrategy<S, Count>;
+  using Base = StoredHierarchyStrategy<S>;
 
  public:
   static constexpr Foresight foresight = Foresight::none;
@@ -85,12 +85,12 @@ class Restructuring : public StoredHierarchyStrategy<S, Count>,
   Random random_{97};
   SubtreeSwap swap_;
 };
-template <class S, class C>
-using Sound = Restructuring<S, C, Boxes::recomputed>;
-template <class S, class C>
-using Faulty = Restructuring<S, C, Boxes::as_before_the_edit>;
+template <class S>
+using Sound = Restructuring<S, Boxes::recomputed>;
+template <class S>
+using Faulty = Restructuring<S, Boxes::as_before_the_edit>;
 
-template <template <class, class> class T>
+template <template <class> class T>
 StrategyEntry restructuring() {
   Info info;
   info.id = "restructuring";
@@ -108,7 +108,7 @@ std::vector<std::string> every_scene() {
 class WideRotations : public testing::TestWithParam<std::string> {};
 
 TEST_P(WideRotations, AtEveryFrameKeepEveryGuarantee) {
-  Sound<float, Counting>::edits = 0;
+  Sound<float>::edits = 0;
   const StrategyEntry entry = restructuring<Sound>();
   for (const std::uint32_t width : {2u, 4u, 8u})
     for (const std::uint32_t leaf : {1u, 4u}) {
@@ -119,7 +119,7 @@ TEST_P(WideRotations, AtEveryFrameKeepEveryGuarantee) {
       EXPECT_EQ(check(entry, synthetic_scene<double>(GetParam(), 3), 3, {}, builder), "") << where;
     }
   if (GetParam() == "soups" || GetParam() == "sheets") {
-    EXPECT_GT((Sound<float, Counting>::edits), 100u);
+    EXPECT_GT((Sound<float>::edits), 100u);
   }
 }
 

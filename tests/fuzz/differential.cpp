@@ -111,7 +111,7 @@ void play(const Scene<S>& scene, const PlanScript<S>& script, std::uint32_t per_
   for (const StrategyEntry& entry : registry()) {
     if (entry.info.guarantee == Guarantee::approximate) continue;
     if (!experiments::unsuitable(entry.info, scene, script, frames).empty()) continue;
-    Session<S> session(scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::counting);
+    Session<S> session(scene, {&entry, {}, entry.info.topology.preferred});
     const auto expect = [&](const Verification& result, const char* when) {
       if (result.holds()) return;
       std::fprintf(stderr, "%s, %s%s: %s\n", entry.info.id.c_str(), sizeof(S) == 4 ? "float" : "double", when,

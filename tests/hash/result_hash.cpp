@@ -62,7 +62,7 @@ std::uint64_t hash_of(const StrategyEntry& entry, const std::vector<std::string>
     const TestScene<S> test = synthetic_scene<S>(name, 7);
     if (test.script.changes_plans() && !entry.info.can.plan_changes) continue;
     const std::vector<double> frames = test.frames.empty() ? frame_times(test.scene, 7) : test.frames;
-    Session<S> session(test.scene, {&entry, params, entry.info.topology.preferred}, CountingPolicy::silent);
+    Session<S> session(test.scene, {&entry, params, entry.info.topology.preferred});
     ScriptCursor<S> cursor(test.script.empty() ? nullptr : &test.script);
     PhaseTimes ignored;
     for (std::size_t f = 0; f < frames.size(); ++f) {

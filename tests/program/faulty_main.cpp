@@ -104,43 +104,43 @@ class EveryAnswer : public EveryPair<S, fault>, public AnswersRays<S>, public An
   }
 };
 
-template <class S, class Count>
+template <class S>
 struct Honest : EveryAnswer<S, Fault::none> {
   using EveryAnswer<S, Fault::none>::EveryAnswer;
 };
-template <class S, class Count>
+template <class S>
 struct LazyWhenTimed : EveryAnswer<S, Fault::lazy_when_timed> {
   using EveryAnswer<S, Fault::lazy_when_timed>::EveryAnswer;
 };
-template <class S, class Count>
+template <class S>
 struct LazyUnlessJudged : EveryPair<S, Fault::lazy_unless_judged> {
   using EveryPair<S, Fault::lazy_unless_judged>::EveryPair;
 };
-template <class S, class Count>
+template <class S>
 struct WorksInReset : EveryPair<S, Fault::works_in_reset> {
   using EveryPair<S, Fault::works_in_reset>::EveryPair;
 };
-template <class S, class Count>
+template <class S>
 struct WorksInFirstQuery : EveryPair<S, Fault::works_in_first_query> {
   using EveryPair<S, Fault::works_in_first_query>::EveryPair;
 };
-template <class S, class Count>
+template <class S>
 struct Loses : EveryPair<S, Fault::loses_a_pair> {
   using EveryPair<S, Fault::loses_a_pair>::EveryPair;
 };
-template <class S, class Count>
+template <class S>
 struct Repeats : EveryPair<S, Fault::repeats_a_pair> {
   using EveryPair<S, Fault::repeats_a_pair>::EveryPair;
 };
-template <class S, class Count>
+template <class S>
 struct NeedsMemory : EveryPair<S, Fault::needs_memory> {
   using EveryPair<S, Fault::needs_memory>::EveryPair;
 };
-template <class S, class Count>
+template <class S>
 struct Aborts : EveryPair<S, Fault::aborts> {
   using EveryPair<S, Fault::aborts>::EveryPair;
 };
-template <class S, class Count>
+template <class S>
 struct Throws : EveryPair<S, Fault::throws> {
   using EveryPair<S, Fault::throws>::EveryPair;
 };

@@ -159,7 +159,7 @@ TEST(Scripts, AreReplayedToThoseWhoCanTakeThem) {
     EXPECT_GT(changes, 0);
     // The driver's own part of a change is motion: nobody else evaluates positions while a script is
     // followed.
-    Session<float> session(scene, spec.contestant(), CountingPolicy::silent);
+    Session<float> session(scene, spec.contestant());
     session.reset(frames[0]);
     PhaseTimes times;
     follow(session, &script.steps[0], times);

@@ -21,9 +21,9 @@ namespace {
 enum class Fault { none, one_ulp, hangs, crashes, throws };
 
 /// A refit with one fault, where there are keyframes beyond the first.
-template <class S, class Count, Fault fault>
-class FaultyRefit : public StoredHierarchyStrategy<S, Count> {
-  using Base = StoredHierarchyStrategy<S, Count>;
+template <class S, Fault fault>
+class FaultyRefit : public StoredHierarchyStrategy<S> {
+  using Base = StoredHierarchyStrategy<S>;
 
  public:
   static constexpr Foresight foresight = Foresight::none;
@@ -44,16 +44,16 @@ class FaultyRefit : public StoredHierarchyStrategy<S, Count> {
     hierarchy.set_box(0, box);
   }
 };
-template <class S, class C>
-using Sound = FaultyRefit<S, C, Fault::none>;
-template <class S, class C>
-using OneUlp = FaultyRefit<S, C, Fault::one_ulp>;
-template <class S, class C>
-using Hangs = FaultyRefit<S, C, Fault::hangs>;
-template <class S, class C>
-using Crashes = FaultyRefit<S, C, Fault::crashes>;
-template <class S, class C>
-using Throws = FaultyRefit<S, C, Fault::throws>;
+template <class S>
+using Sound = FaultyRefit<S, Fault::none>;
+template <class S>
+using OneUlp = FaultyRefit<S, Fault::one_ulp>;
+template <class S>
+using Hangs = FaultyRefit<S, Fault::hangs>;
+template <class S>
+using Crashes = FaultyRefit<S, Fault::crashes>;
+template <class S>
+using Throws = FaultyRefit<S, Fault::throws>;
 
 /// Some events never get into the queue.
 template <class S>
@@ -64,15 +64,15 @@ class LossyQueue : public AvlQueue<S> {
     if ((event.winner + event.loser) % 5 != 0) AvlQueue<S>::schedule(event);
   }
 };
-template <class S, class Count>
-class LosesEvents : public KineticAabbStrategy<S, Count, LossyQueue<S>> {
+template <class S>
+class LosesEvents : public KineticAabbStrategy<S, LossyQueue<S>> {
  public:
   LosesEvents(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies, const Params&)
-      : KineticAabbStrategy<S, Count, LossyQueue<S>>(scene, motion, std::move(topologies), 0,
-                                                     KineticQuery::wide_rows) {}
+      : KineticAabbStrategy<S, LossyQueue<S>>(scene, motion, std::move(topologies), 0,
+                                              KineticQuery::wide_rows) {}
 };
 
-template <template <class, class> class Strategy>
+template <template <class> class Strategy>
 const StrategyEntry& entry(const char* id) {
   static const StrategyEntry made = [id] {
     Info info;

@@ -15,7 +15,7 @@ struct Play {
       : Play(scene, id, std::move(params), find_strategy(id).info.topology.preferred) {}
   Play(const Scene<S>& scene, const char* id, std::map<std::string, std::string> params,
        const BuilderConfig& builder)
-      : session(scene, {&find_strategy(id), std::move(params), builder}, CountingPolicy::counting) {
+      : session(scene, {&find_strategy(id), std::move(params), builder}) {
     reset(0);
   }
   void reset(double t) {

@@ -78,7 +78,7 @@ struct BoxTreeReport {
 /// that all it stores is the exact envelope of what lies below (check_envelopes). `BoxTree` is the kind of
 /// tree: faulty ones derive from KineticBoxTree.
 template <class S, template <class> class Queue,
-          template <class, class, class, class> class BoxTree = KineticBoxTree>
+          template <class, class, class> class BoxTree = KineticBoxTree>
 class BoxTreeProof {
  public:
   static BoxTreeReport run(const TestScene<S>& test, const BoxTreePlay& play) {
@@ -86,7 +86,7 @@ class BoxTreeProof {
   }
 
  private:
-  using Forest = KineticForest<S, Queue<S>, Counting, BoxTreeRecorder<S>, BoxTree>;
+  using Forest = KineticForest<S, Queue<S>, BoxTreeRecorder<S>, BoxTree>;
   using Bounds = std::vector<std::vector<std::uint32_t>>;  // [body][6 * node + side]
 
   BoxTreeProof(const TestScene<S>& test, const BoxTreePlay& play)
@@ -128,8 +128,8 @@ class BoxTreeProof {
     last += test_.script.steps.empty() ? 1.0 : 3.0;
     forest_->advance(last);
     close(last);
-    report_.events = count_.table[Counter::certificates_failed];
-    report_.values_written = count_.table[Counter::values_written];
+    report_.events = count_[Counter::certificates_failed];
+    report_.values_written = count_[Counter::values_written];
     return report_;
   }
 
@@ -271,7 +271,7 @@ class BoxTreeProof {
   std::vector<double> frames_;
   double first_;
   Random random_;
-  Counting count_;
+  Counters count_;
   std::vector<BoxTreeNotice<S>> log_;
   std::unique_ptr<Forest> forest_;
   std::vector<StoredPlans> plans_;

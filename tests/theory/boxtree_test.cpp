@@ -139,22 +139,22 @@ TEST(BoxTree, EventsDoNotDependOnTheNumberOfFrames) {
 
 /// A tree whose lists of candidates lack the vertices of leaves, as after a search that does not go down to
 /// the leaves below other sides.
-template <class S, class Queue, class Count, class Observer>
-class ForgetsLeaves : public KineticBoxTree<S, Queue, Count, Observer> {
+template <class S, class Queue, class Observer>
+class ForgetsLeaves : public KineticBoxTree<S, Queue, Observer> {
  public:
-  using KineticBoxTree<S, Queue, Count, Observer>::KineticBoxTree;
+  using KineticBoxTree<S, Queue, Observer>::KineticBoxTree;
   void initialise(double t) {
-    KineticBoxTree<S, Queue, Count, Observer>::initialise(t);
+    KineticBoxTree<S, Queue, Observer>::initialise(t);
     for (auto& bound : this->bounds_) bound.last = bound.vertices;
   }
 };
 /// A tree whose lists of candidates lack one bound below, as after a search that leaves out one child.
-template <class S, class Queue, class Count, class Observer>
-class ForgetsAChild : public KineticBoxTree<S, Queue, Count, Observer> {
+template <class S, class Queue, class Observer>
+class ForgetsAChild : public KineticBoxTree<S, Queue, Observer> {
  public:
-  using KineticBoxTree<S, Queue, Count, Observer>::KineticBoxTree;
+  using KineticBoxTree<S, Queue, Observer>::KineticBoxTree;
   void initialise(double t) {
-    KineticBoxTree<S, Queue, Count, Observer>::initialise(t);
+    KineticBoxTree<S, Queue, Observer>::initialise(t);
     for (auto& bound : this->bounds_) bound.first = std::min(bound.first + 1, bound.vertices);
   }
 };
@@ -182,8 +182,8 @@ std::uint64_t audit_between_events(const std::string& name) {
   const double first = frame_times(test.scene, 1).front(), last = frame_times(test.scene, 1).back();
   playback.seek(first);
   const Topologies topologies = build_topologies(view, playback, {.width = 2, .leaf_size = 1});
-  Counting count;
-  KineticBoxForest<S, AvlQueue<S>, Counting> forest(view, ClipMotion<S>(playback), topologies, count);
+  Counters count;
+  KineticBoxForest<S, AvlQueue<S>> forest(view, ClipMotion<S>(playback), topologies, count);
   forest.reset(first);
   std::uint64_t audits = 0;
   const auto audit_at = [&](double t) {
@@ -271,8 +271,8 @@ std::uint64_t compare_rows(const std::string& name, const BoxTreeConstruction& c
   const std::vector<double> frames = frame_times(test.scene, 3);
   playback.seek(frames.front());
   const ClipMotion<S> motion(playback);
-  Counting count;
-  KineticBoxForest<S, SegmentHeapQueue<S>, Counting> forest(
+  Counters count;
+  KineticBoxForest<S, SegmentHeapQueue<S>> forest(
       view, motion, build_topologies(view, playback, {.width = 2, .leaf_size = leaf_size}), count);
   for (std::uint32_t body = 0; body < view.body_count(); ++body) forest.tree(body).construct_as(construction);
   forest.reset(frames.front());
@@ -357,8 +357,8 @@ EventCost cost_of_events(const TestScene<double>& test, const BoxTreeConstructio
   const SceneView<double> view(test.scene);
   Playback<double> playback(test.scene);
   playback.seek(0);
-  Counting count;
-  KineticBoxForest<double, AvlQueue<double>, Counting> forest(
+  Counters count;
+  KineticBoxForest<double, AvlQueue<double>> forest(
       view, ClipMotion<double>(playback), build_topologies(view, playback, {.width = 2, .leaf_size = 1}),
       count);
   auto& tree = forest.tree(0);
@@ -431,7 +431,7 @@ TEST(BoxTree, StoresTwoRealisersPerInnerNodeAndSixMore) {
   const Topologies topologies = build_topologies(view, playback, {.width = 2, .leaf_size = 1});
   std::uint64_t inner = 0;
   for (const TopologyNode node : topologies[0].nodes) inner += node.is_leaf() ? 0 : 1;
-  using Tree = KineticBoxForest<float, AvlQueue<float>, Counting>::Tree;
+  using Tree = KineticBoxForest<float, AvlQueue<float>>::Tree;
   EXPECT_EQ(Tree::slot_count(topologies[0]), 2 * inner + 6);
 }
 
@@ -439,8 +439,8 @@ TEST(BoxTree, RefusesWideTopologies) {
   const auto test = synthetic_scene<float>("soups");
   const SceneView<float> view(test.scene);
   Playback<float> playback(test.scene);
-  Counting count;
-  EXPECT_THROW((KineticBoxForest<float, AvlQueue<float>, Counting>(
+  Counters count;
+  EXPECT_THROW((KineticBoxForest<float, AvlQueue<float>>(
                    view, ClipMotion<float>(playback),
                    build_topologies(view, playback, {.width = 4, .leaf_size = 1}), count)),
                std::invalid_argument);

@@ -20,7 +20,7 @@ namespace {
 using namespace kbvh::theory;
 
 template <class S, class Queue>
-using TreesOn = ExactKineticAabbStrategy<S, Counting, Queue>;
+using TreesOn = ExactKineticAabbStrategy<S, Queue>;
 
 /// Kinetic AABB trees on an event queue of a kind.
 template <class S>

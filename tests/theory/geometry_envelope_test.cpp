@@ -61,10 +61,10 @@ OwnKnots own_knots(double t, const PlanChange<S>& change, const S* position) {
   return knots;
 }
 
-template <class S, template <class, class, class, class> class Tree = KineticAabbTree>
+template <class S, template <class, class, class> class Tree = KineticAabbTree>
 class Prover {
  public:
-  using Forest = KineticForest<S, AvlQueue<S>, Counting, Listener<S>, Tree>;
+  using Forest = KineticForest<S, AvlQueue<S>, Listener<S>, Tree>;
 
   /// Not 0: at every change, parts chosen at random are rebuilt too, if the tree can do so.
   Prover(const TestScene<S>& test, const BuilderConfig& builder, std::uint64_t rebuild_seed = 0)
@@ -190,7 +190,7 @@ class Prover {
   ChangingScene<S> changing_;
   SceneView<S> view_;
   Playback<S> playback_;
-  Counting count_;
+  Counters count_;
   std::vector<Told<S>> log_;
   std::optional<Forest> forest_;
   std::vector<StoredPlans> plans_;
@@ -262,10 +262,10 @@ INSTANTIATE_TEST_SUITE_P(Scenes, GeometryEnvelopes, testing::ValuesIn(geometry_s
 // ---- Seeded fault: the proof must catch it ---------------------------------------------------------------
 
 /// A tree that does not carry an insertion up to the root: the root keeps its realisers.
-template <class S, class Queue, class Count, class Observer>
-class ForgetfulBoxTree : public KineticBoxTree<S, Queue, Count, Observer> {
+template <class S, class Queue, class Observer>
+class ForgetfulBoxTree : public KineticBoxTree<S, Queue, Observer> {
  public:
-  using Base = KineticBoxTree<S, Queue, Count, Observer>;
+  using Base = KineticBoxTree<S, Queue, Observer>;
   using Base::Base;
   void insert(double t, std::uint32_t primitive, const Primitives& primitives,
               const SampledMotion<S>& motion) {
@@ -323,8 +323,8 @@ EditCost cost_of_edits(std::uint32_t count, const GeometryChange<double>& change
   const SceneView<double> view(changing.scene());
   Playback<double> playback(scene);
   playback.seek(0);
-  Counting counting;
-  KineticBoxForest<double, AvlQueue<double>, Counting> forest(
+  Counters counting;
+  KineticBoxForest<double, AvlQueue<double>> forest(
       view, ClipMotion<double>(playback), build_topologies(view, playback, {.width = 2, .leaf_size = 1}),
       counting);
   forest.reset(0);

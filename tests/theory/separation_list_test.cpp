@@ -130,7 +130,7 @@ struct Kinds {
 template <class S>
 Kinds play(const std::string& name, const BuilderConfig& builder, std::uint64_t audits,
            std::string_view queue, int look_ahead = OverlapClock<S>::usual_look_ahead) {
-  using Collision = KineticCollision<S, AnyEventQueue, Counting>;
+  using Collision = KineticCollision<S, AnyEventQueue>;
   const auto test = synthetic_scene<S>(name, 2);
   const std::vector<double> frames = test.frames.empty() ? frame_times(test.scene, 2) : test.frames;
   Kinds kinds;
@@ -142,11 +142,11 @@ Kinds play(const std::string& name, const BuilderConfig& builder, std::uint64_t 
     const SceneView<S> view(changing.scene());
     Playback<S> playback(test.scene);
     playback.seek(frames.front());
-    Counting count;
+    Counters count;
     Collision collision(view, ClipMotion<S>(playback), build_topologies(view, playback, builder), count,
                         look_ahead, queue);
     collision.reset(frames.front());
-    count.table = {};
+    count = {};
     Auditor<S, Collision> auditor(collision, view);
     auto step = test.script.steps.begin();
     std::uint64_t events = 0, geometry = 0;
@@ -184,7 +184,7 @@ Kinds play(const std::string& name, const BuilderConfig& builder, std::uint64_t 
     }
     every = std::max<std::uint64_t>(1, events / audits);
     compared = auditor.audits;
-    const Counters& table = count.table;
+    const Counters& table = count;
     kinds = {table[Counter::overlap_events], table[Counter::fathers_apart_events],
              table[Counter::leaves_apart_events], table[Counter::bound_change_events], geometry};
     if (auditing && geometry != 0)
@@ -262,14 +262,14 @@ struct Locality {
 /// Triangles of either sheet whose boxes meet the other sheet's are taken out, one at a time, and inserted
 /// again on their vertices.
 Locality locality(std::uint32_t n) {
-  using Collision = KineticCollision<float, AnyEventQueue, Counting>;
+  using Collision = KineticCollision<float, AnyEventQueue>;
   const Scene<float> scene = crossing_sheets(n);
   ChangingScene<float> changing(scene);
   const SceneView<float> view(changing.scene());
   Playback<float> playback(scene);
   const double t = 0.53;  // when no two corners meet
   playback.seek(t);
-  Counting count;
+  Counters count;
   Collision collision(view, ClipMotion<float>(playback),
                       build_topologies(view, playback, {.width = 2, .leaf_size = 1}), count,
                       OverlapClock<float>::usual_look_ahead, avl);
@@ -337,10 +337,10 @@ TEST(SeparationListEvents, EachKindHappensOftenInTheTestScenes) {
 TEST(SeparationListFaults, MissedNotices) {
   const auto test = synthetic_scene<float>("sheets");
   const SceneView<float> view(test.scene);
-  using Collision = KineticCollision<float, AnyEventQueue, Counting>;
+  using Collision = KineticCollision<float, AnyEventQueue>;
   for (const std::uint64_t missed : {1u, 10u, 50u}) {  // every such notice
     Playback<float> playback(test.scene);
-    Counting count;
+    Counters count;
     Collision collision(view, ClipMotion<float>(playback),
                         build_topologies(view, playback, {.width = 2, .leaf_size = 1}), count,
                         OverlapClock<float>::usual_look_ahead, avl);

@@ -168,7 +168,7 @@ template <class S>
 std::string violation(const StrategyEntry& entry, const Scene<S>& scene, const std::vector<double>& frames,
                       const PlanScript<S>& script) {
   check_played<S>(scene, script, frames);
-  Session<S> session(scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+  Session<S> session(scene, {&entry, {}, entry.info.topology.preferred});
   Oracle<S> oracle(scene, {}, hash(script));
   const auto played = [&] {
     return verify(session, std::span<const double>(frames), oracle, &script).first_violation;
@@ -254,7 +254,7 @@ TEST_P(EveryStrategy, ASessionStopsBeforeTheEndOfTheRange) {
   const StrategyEntry& entry = find_strategy(GetParam());
   if (entry.factory<float>() == nullptr) return;
   const Scene<float> scene = small_scene<float>();
-  Session<float> session(scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+  Session<float> session(scene, {&entry, {}, entry.info.topology.preferred});
   PhaseTimes times;
   PairBuffer pairs;
   session.reset(0);

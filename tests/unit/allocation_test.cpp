@@ -70,8 +70,7 @@ std::string allocations_when_warm(const StrategyEntry& entry, const TestScene<S>
                                   const std::map<std::string, std::string>& params = {},
                                   std::optional<Answer> changes = {},
                                   const std::optional<BuilderConfig>& builder = {}) {
-  Session<S> session(test.scene, {&entry, params, builder.value_or(entry.info.topology.preferred)},
-                     CountingPolicy::silent);
+  Session<S> session(test.scene, {&entry, params, builder.value_or(entry.info.topology.preferred)});
   PhaseTimes times;
   PairBuffer pairs, ended;
   const auto query = [&] {
@@ -156,7 +155,7 @@ TEST(Allocation, NoneOnceWarmWhereChangesAreAsked) {
 /// The same for rays, at every frame.
 template <class S>
 std::string allocations_of_rays(const StrategyEntry& entry, const TestScene<S>& test) {
-  Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+  Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred});
   std::vector<Ray<S>> rays;
   for (int i = 0; i < 32; ++i)
     rays.push_back({{S(-3), S(0.11 * i - 1.7), S(0.05 * i - 0.8)}, {S(1), S(0.3), S(0.02 * i - 0.3)}});
@@ -350,7 +349,7 @@ double declared_over_held(const StrategyEntry& entry) {
   for (const Topology& topology : topologies) handed_over += topology.bytes();
   const Params params(entry.info.id, entry.info.parameters, {});
   const std::size_t before = heap_bytes();
-  const auto strategy = create(entry, view, playback, std::move(topologies), params, CountingPolicy::silent);
+  const auto strategy = create(entry, view, playback, std::move(topologies), params);
   for (int round = 0; round < 2; ++round)
     for (int f = 0; f <= 20; ++f) {
       const double t = 0.1 * f;

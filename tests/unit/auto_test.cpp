@@ -418,11 +418,11 @@ TEST(Auto, ChoosesTheSameAgainWhereChangesAreAsked) {
   EXPECT_EQ(play.session.strategy().choice(), first);
 }
 
-TEST(Auto, ChoosesTheSameWhereNothingIsCounted) {
+TEST(Auto, ChoosesTheSameWhereItIsTimed) {
   const Scene<float> scene = flying_triangles(2000, 30, Flight::anywhere);
   std::string choices[2];
-  for (const CountingPolicy policy : {CountingPolicy::counting, CountingPolicy::silent}) {
-    Session<float> session(scene, {&find_strategy("auto"), {}, {}}, policy);
+  for (const Use use : {Use::verified, Use::timed}) {
+    Session<float> session(scene, {&find_strategy("auto"), {}, {}}, use);
     session.reset(0);
     PhaseTimes times;
     PairBuffer pairs;
@@ -430,7 +430,7 @@ TEST(Auto, ChoosesTheSameWhereNothingIsCounted) {
       session.advance(f / 3.0, times);
       session.query(pairs, times);
     }
-    choices[policy == CountingPolicy::silent] = session.strategy().choice();
+    choices[use == Use::timed] = session.strategy().choice();
   }
   EXPECT_EQ(choices[0], choices[1]);
   EXPECT_NE(choices[0].find("interval_join"), std::string::npos) << choices[0];
@@ -443,11 +443,11 @@ TEST(NestedStrategies, KnowNoMoreOfTheFutureThanTheirOwner) {
   const StrategyEntry& entry = find_strategy("interval_join");
   const Params params(entry.info.id, entry.info.parameters, {});
   const Topologies topologies = build_topologies(view, playback, entry.info.topology.preferred);
-  EXPECT_THROW(NestedStrategies<float>::create(entry, view, SteppedMotion<float>(playback), topologies,
-                                               params, CountingPolicy::silent),
-               ConfigError);
-  EXPECT_NO_THROW(NestedStrategies<float>::create(entry, view, ClipMotion<float>(playback), topologies,
-                                                  params, CountingPolicy::silent));
+  EXPECT_THROW(
+      NestedStrategies<float>::create(entry, view, SteppedMotion<float>(playback), topologies, params),
+      ConfigError);
+  EXPECT_NO_THROW(
+      NestedStrategies<float>::create(entry, view, ClipMotion<float>(playback), topologies, params));
 }
 
 // Whatever a join was predicted to cost, it is not chosen again where its counts say that a refit costs less:

@@ -18,8 +18,8 @@ std::array<std::uint64_t, 2> box_tests(const std::string& id,
                                        const std::map<std::string, std::string>& params,
                                        const Scene<float>& scene) {
   const StrategyEntry& entry = find_strategy(id);
-  Session<float> session(scene, {&entry, params, {.method = BuildMethod::median, .width = 8, .leaf_size = 8}},
-                         CountingPolicy::counting);
+  Session<float> session(scene,
+                         {&entry, params, {.method = BuildMethod::median, .width = 8, .leaf_size = 8}});
   PhaseTimes times;
   PairBuffer pairs;
   std::array<std::uint64_t, 2> made{};

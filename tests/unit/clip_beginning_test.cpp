@@ -114,18 +114,18 @@ TEST(ClipBeginning, NothingOfTheMotionIsKnownBeforeOrLeftFromAnEarlierPlay) {
     if (entry.factory<float>() == nullptr) continue;
     SCOPED_TRACE(entry.info.id);
     const Contestant contestant{&entry, {}, entry.info.topology.preferred};
-    Session<float> fresh(truth_scene, contestant, CountingPolicy::counting);
+    Session<float> fresh(truth_scene, contestant);
     const Played first = play(fresh, frames, oracle);
     EXPECT_EQ(first.violation, "");
     expect_equal(play(fresh, frames, oracle), first, "second play");
 
     const Scene<float> made_before = scene_of(slow);
-    Session<float> created(made_before, contestant, CountingPolicy::counting);
+    Session<float> created(made_before, contestant);
     replace_motion(made_before, truth_scene);
     expect_equal(play(created, frames, oracle), first, "created for another motion");
 
     const Scene<float> played_before = scene_of(slow);
-    Session<float> again(played_before, contestant, CountingPolicy::counting);
+    Session<float> again(played_before, contestant);
     PhaseTimes ignored;
     PairBuffer found;
     again.restore(frames[0]);

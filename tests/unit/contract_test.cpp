@@ -19,12 +19,12 @@ namespace {
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// A strategy that checks nothing and clears nothing itself.
-template <class S, class Count>
-class Careless : public CountedStrategy<S, Count> {
+template <class S>
+class Careless : public CountedStrategy<S> {
  public:
   static constexpr Foresight foresight = Foresight::none;
   Careless(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies, const Params&)
-      : CountedStrategy<S, Count>(scene, motion) {}
+      : CountedStrategy<S>(scene, motion) {}
   std::size_t bytes() const override { return 0; }
   double now() const { return this->time(); }
   double before() const { return this->previous_time(); }
@@ -54,8 +54,8 @@ class Careless : public CountedStrategy<S, Count> {
 };
 
 /// The same with every ability.
-template <class S, class Count>
-class Able : public Careless<S, Count>,
+template <class S>
+class Able : public Careless<S>,
              public AnswersChanges<S>,
              public AnswersSelfPairs,
              public AnswersSpans<S>,
@@ -64,7 +64,7 @@ class Able : public Careless<S, Count>,
              public TakesPlanChanges<S>,
              public TakesGeometryChanges<S> {
  public:
-  using Careless<S, Count>::Careless;
+  using Careless<S>::Careless;
   std::vector<std::string> calls;
 
  protected:
@@ -80,10 +80,10 @@ class Able : public Careless<S, Count>,
   void follow_geometry(double, const GeometryChange<S>&) override { calls.push_back("geometry"); }
 };
 
-template <class S, class Count>
-class MisnamedCounter : public Careless<S, Count> {
+template <class S>
+class MisnamedCounter : public Careless<S> {
  public:
-  using Careless<S, Count>::Careless;
+  using Careless<S>::Careless;
 
  protected:
   void add_counts(Counters& table) const override { table.add("box_tests", 1); }
@@ -101,12 +101,12 @@ Scene<float> two_grids() {
 }
 
 /// A strategy with the scene and playback that it sees.
-template <template <class, class> class T, class Count = Counting>
+template <template <class> class T>
 struct Made {
   Scene<float> scene = two_grids();
   SceneView<float> view{scene};
   Playback<float> playback{scene};
-  T<float, Count> strategy{view, SampledMotion<float>(playback), {}, {}};
+  T<float> strategy{view, SampledMotion<float>(playback), {}, {}};
   PairBuffer pairs;
 };
 
@@ -172,7 +172,7 @@ TEST(Contract, NoFlagLies) {
   for (const StrategyEntry& entry : registry()) {
     if (entry.factory<float>() == nullptr) continue;
     const Capabilities& can = entry.info.can;
-    Session<float> session(scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+    Session<float> session(scene, {&entry, {}, entry.info.topology.preferred});
     session.reset(0);
     Strategy<float>& strategy = session.strategy();
     EXPECT_EQ(refused([&] { strategy.flight_plans_changed(0, {}); }), !can.plan_changes) << entry.info.id;
@@ -191,7 +191,7 @@ TEST(Contract, NoFlagLies) {
 
 TEST(Contract, TheBaseClassChecksTimes) {
   Made<Able> made;
-  Able<float, Counting>& strategy = made.strategy;
+  Able<float>& strategy = made.strategy;
   for (const double t : {std::nan(""), infinity, -infinity})
     EXPECT_THROW(strategy.reset(t), std::invalid_argument) << t;
   EXPECT_EQ(strategy.resets, 0);
@@ -255,14 +255,6 @@ TEST(Contract, TheBaseClassClearsCounters) {
     EXPECT_EQ(counters.named[0].name, "advances_of_its_own");
     EXPECT_EQ(counters.named[0].value, 2u);
   }
-}
-
-TEST(Contract, ASilentInstanceHasNoCountersOfItsOwn) {
-  Made<Careless, Silent> made;
-  made.strategy.reset(0);
-  made.strategy.advance(0.5);
-  EXPECT_TRUE(made.strategy.counters().named.empty());
-  EXPECT_EQ(made.strategy.counters()[Counter::positions_fetched], 0u);
 }
 
 TEST(Contract, ACounterOfOnesOwnHasANameOfItsOwn) {
@@ -371,14 +363,14 @@ TEST(Contract, KindsOfPrimitivesAreChecked) {
   const StrategyEntry entry = make_entry<Careless>(picky);
   Scene<float> scene = two_grids();
   EXPECT_EQ(unsuitable_bodies(entry.info, scene), "");
-  Session<float> fine(scene, {&entry, {}, {}}, CountingPolicy::silent);
+  Session<float> fine(scene, {&entry, {}, {}});
   Primitives points;
   points.kind = PrimitiveKind::points;
   for (std::uint32_t v = 0; v < scene.bodies[1].plans.vertex_count(); ++v) points.add({&v, 1});
   scene.bodies[1].primitives = points;
   scene.bodies[1].name = "dust";
   EXPECT_EQ(unsuitable_bodies(entry.info, scene), "does not take points, as in body 'dust'");
-  EXPECT_THROW(Session<float>(scene, {&entry, {}, {}}, CountingPolicy::silent), ConfigError);
+  EXPECT_THROW(Session<float>(scene, {&entry, {}, {}}), ConfigError);
   const StrategyEntry any = make_entry<Careless>(described("any"));
   EXPECT_EQ(unsuitable_bodies(any.info, scene), "");
 }
@@ -398,15 +390,13 @@ TEST(Contract, PositionsCanBeHandedIn) {
     if (entry.factory<float>() == nullptr) continue;
     if (entry.info.foresight != Foresight::none) {
       EXPECT_NE(unsuitable_bodies(entry.info, unknown).find("handed in"), std::string::npos);
-      EXPECT_THROW(
-          Session<float>(unknown, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent),
-          ConfigError)
+      EXPECT_THROW(Session<float>(unknown, {&entry, {}, entry.info.topology.preferred}), ConfigError)
           << entry.info.id;
       continue;
     }
     ++able;
-    Session<float> expected(known, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
-    Session<float> session(unknown, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+    Session<float> expected(known, {&entry, {}, entry.info.topology.preferred});
+    Session<float> session(unknown, {&entry, {}, entry.info.topology.preferred});
     Playback<float> source(known);
     std::vector<std::vector<float>> arrays(known.bodies.size());
     const auto hand_in = [&](double t) {

@@ -105,8 +105,7 @@ TEST(DriftBoxes, ABodyThatRestsAgainAfterAResetIsWhereItWas) {
   for (std::uint32_t v = 0; v < scene.bodies[1].plans.vertex_count(); ++v)
     script.steps[0].changes.push_back({.body = 1, .vertex = v, .velocity = {0.3f, 0, 0}});
   for (const char* id : {"drift_boxes", "drift_boxes_bounded", "auto"}) {
-    Session<float> session(scene, {&find_strategy(id), {}, find_strategy(id).info.topology.preferred},
-                           CountingPolicy::counting);
+    Session<float> session(scene, {&find_strategy(id), {}, find_strategy(id).info.topology.preferred});
     Oracle<float> with(scene, {}, hash(script)), without(scene);
     EXPECT_EQ(verify(session, std::span<const double>(frames), with, &script).first_violation, "") << id;
     const Verification again = verify(session, std::span<const double>(frames), without);
@@ -118,8 +117,7 @@ TEST(DriftBoxes, ABodyThatRestsAgainAfterAResetIsWhereItWas) {
 /// Asks for pairs and rays at every frame, and compares the hits with brute force. Returns the number of
 /// frames that made no boxes.
 int check_rays(const Scene<float>& scene, const char* id) {
-  Session<float> session(scene, {&find_strategy(id), {}, find_strategy(id).info.topology.preferred},
-                         CountingPolicy::counting);
+  Session<float> session(scene, {&find_strategy(id), {}, find_strategy(id).info.topology.preferred});
   session.reset(0);
   session.playback().evaluate_all();
   const std::vector<Ray<float>> rays = rays_at(session.scene(), session.playback(), 4, 1);

@@ -150,7 +150,7 @@ std::uint64_t steps(const Counters& counters) {
 
 std::uint64_t steps_of_clip(const StrategyEntry& entry, const std::map<std::string, std::string>& params,
                             const Scene<float>& scene) {
-  Session<float> session(scene, {&entry, params, entry.info.topology.preferred}, CountingPolicy::counting);
+  Session<float> session(scene, {&entry, params, entry.info.topology.preferred});
   PhaseTimes times;
   PairBuffer pairs;
   session.reset(0);

@@ -40,8 +40,8 @@ void compare(const StrategyEntry& entry, const std::string& name,
   if (has_self_pairs(test.scene.pairs) && !entry.info.can.self_pairs) return;
   const std::vector<double> frames = test.frames.empty() ? frame_times(test.scene, 3) : test.frames;
   const Contestant contestant{&entry, params, entry.info.topology.preferred};
-  Session<S> by_frames(test.scene, contestant, CountingPolicy::counting);
-  Session<S> by_events(test.scene, contestant, CountingPolicy::counting);
+  Session<S> by_frames(test.scene, contestant);
+  Session<S> by_events(test.scene, contestant);
   ScriptCursor<S> cursor_a(test.script.empty() ? nullptr : &test.script), cursor_b = cursor_a;
   PhaseTimes times;
   PairBuffer pairs_a, pairs_b;
@@ -156,8 +156,7 @@ std::vector<ScheduledEvent<S>> log_of(const StrategyEntry& entry, const TestScen
   const std::vector<double> frames = test.frames.empty() ? frame_times(test.scene, 2) : test.frames;
   Session<S> session(
       test.scene,
-      {&entry, {{"queue", queue}}, BuilderConfig{.method = BuildMethod::median, .width = 2, .leaf_size = 1}},
-      CountingPolicy::silent);
+      {&entry, {{"queue", queue}}, BuilderConfig{.method = BuildMethod::median, .width = 2, .leaf_size = 1}});
   ScriptCursor<S> cursor(test.script.empty() ? nullptr : &test.script);
   PhaseTimes times;
   std::vector<ScheduledEvent<S>> log;
@@ -280,8 +279,7 @@ TEST(EventSource, WatchedPairsAreThoseOfTheSeparationList) {
     Session<float> session(test.scene,
                            {&find_strategy("kinetic_separation_list"),
                             {},
-                            BuilderConfig{.method = BuildMethod::median, .width = 2, .leaf_size = 1}},
-                           CountingPolicy::silent);
+                            BuilderConfig{.method = BuildMethod::median, .width = 2, .leaf_size = 1}});
     ScriptCursor<float> cursor(test.script.empty() ? nullptr : &test.script);
     PhaseTimes times;
     std::size_t most = 0;
@@ -301,7 +299,7 @@ TEST(EventSource, OtherStrategiesWatchNoPairs) {
   const TestScene<float> test = synthetic_scene<float>("soups", 1);
   for (const StrategyEntry* entry : sources()) {
     if (entry->info.id == "kinetic_separation_list") continue;
-    Session<float> session(test.scene, {entry, {}, entry->info.topology.preferred}, CountingPolicy::silent);
+    Session<float> session(test.scene, {entry, {}, entry->info.topology.preferred});
     session.reset(frame_times(test.scene, 1).front());
     std::vector<WatchedPair> watched(3);
     session.strategy().events()->watched_pairs(watched);
@@ -317,7 +315,7 @@ TEST(BoxTreeCounters, CountSearchesSinceTheReset) {
   const Contestant contestant{&find_strategy("kinetic_boxtree"),
                               {{"candidates", "searched"}},
                               BuilderConfig{.method = BuildMethod::median, .width = 2, .leaf_size = 1}};
-  Session<float> session(test.scene, contestant, CountingPolicy::counting);
+  Session<float> session(test.scene, contestant);
   const auto named = [&] {
     std::map<std::string, std::uint64_t> values;
     for (const Counters::Named& counter : session.strategy().counters().named)
@@ -346,10 +344,6 @@ TEST(BoxTreeCounters, CountSearchesSinceTheReset) {
   EXPECT_LE(before.at("most_nodes_searched"), 2 * largest);
   session.reset(frames.front());
   EXPECT_EQ(named(), none);
-
-  Session<float> silent(test.scene, contestant, CountingPolicy::silent);
-  silent.reset(frames.front());
-  EXPECT_TRUE(silent.strategy().counters().named.empty());
 }
 
 }  // namespace

@@ -199,20 +199,20 @@ Cost repairs(std::uint32_t side) {
   Playback<float> playback(original);
   const SceneView<float> view(changing.scene());
   playback.seek(0.5);
-  Counting count;
+  Counters count;
   Topologies topologies = build_topologies(view, playback, {.width = 2, .leaf_size = 1});
   const std::uint64_t depth = *std::max_element(topologies[0].depths.begin(), topologies[0].depths.end());
-  KineticForest<float, AvlQueue<float>, Counting> forest(view, ClipMotion<float>(playback),
-                                                         std::move(topologies), count);
+  KineticForest<float, AvlQueue<float>> forest(view, ClipMotion<float>(playback), std::move(topologies),
+                                               count);
   forest.reset(0.5);
   Random random(3);
   Cost cost;
   const int operations = 200;
   const auto made = [&](const GeometryChange<float>& change) {
     changing.apply(change, playback);
-    count.table = {};
+    count = {};
     forest.geometry_changed(playback.time(), view, ClipMotion<float>(playback), body_changes(view, change));
-    const std::uint64_t certificates = count.table[Counter::certificates_made];
+    const std::uint64_t certificates = count[Counter::certificates_made];
     cost.most = std::max(cost.most, certificates);
     // One side of a node takes one certificate, of a triangle's leaf two; the leaves touched are two, the
     // nodes above them fewer than `depth` + 2.

@@ -113,7 +113,7 @@ void check_stacked_squares() {
           box.extend(boxes[1]);
           return box;
         },
-        [&](std::uint32_t body, RaySearch<S>& search) {
+        [&](std::uint32_t body, RaySearch<S>& search, std::uint64_t&) {
           ++followed[body];
           const Primitives& primitives = view.primitives(body);
           for (std::uint32_t p = 0; p < primitives.count(); ++p)

@@ -68,8 +68,8 @@ struct Findings {
 
 template <class S, int K>
 class Play {
-  using Forest = KineticForest<S, SegmentHeapQueue<S>, Counting, NoObserver, KineticDop<K>::template Tree>;
-  using Boxes = KineticForest<S, AvlQueue<S>, Counting>;
+  using Forest = KineticForest<S, SegmentHeapQueue<S>, NoObserver, KineticDop<K>::template Tree>;
+  using Boxes = KineticForest<S, AvlQueue<S>>;
 
  public:
   Play(const Scene<S>& scene, const BuilderConfig& builder)
@@ -253,7 +253,7 @@ class Play {
   Scene<S> scene_;
   SceneView<S> view_;
   Playback<S> playback_;
-  Counting count_;
+  Counters count_;
   Forest forest_;
   Boxes boxes_;
   std::vector<RealiserDops<S, K>> dops_;

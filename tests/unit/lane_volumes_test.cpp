@@ -43,7 +43,7 @@ std::string invalid(const H& hierarchy, const Cloud<typename H::Scalar>& cloud) 
 template <class H>
 PairBuffer found(H& a, H& b) {
   typename H::Scratch scratch;
-  BoxTests tests;
+  std::uint64_t tests = 0;
   PairBuffer out;
   EXPECT_EQ(H::find_pairs(a, 0, b, &a == &b ? 0 : 1, scratch, tests, {}, out), 0U);
   return out;

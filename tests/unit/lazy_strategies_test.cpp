@@ -156,7 +156,7 @@ TEST(Hybrid, MakesOnlyTheSubtreesThatAQueryEnters) {
 TEST(Hybrid, ABudgetLeavesWorkUndone) {
   const Scene<float> scene = grids<float>(30, 0, left_side);
   const StrategyEntry& entry = find_strategy("hybrid");
-  Session<float> session(scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::counting);
+  Session<float> session(scene, {&entry, {}, entry.info.topology.preferred});
   session.reset(0);
   PhaseTimes times;
   PairBuffer pairs;

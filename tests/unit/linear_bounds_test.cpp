@@ -55,7 +55,7 @@ TEST(LinearBounds, BodiesThatComeNearAgainGetAllTheirBoxes) {
   for (const char* id : {"linear_bounds", "interval_join", "interval_join_ahead", "drift_boxes",
                          "drift_boxes_bounded", "auto"}) {
     const StrategyEntry& entry = find_strategy(id);
-    Session<double> session(scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::counting);
+    Session<double> session(scene, {&entry, {}, entry.info.topology.preferred});
     Oracle<double> oracle(scene);
     const std::vector<double> frames = frame_times(scene, 13);
     const Verification result = verify(session, std::span<const double>(frames), oracle);
@@ -78,7 +78,7 @@ TEST(LinearBounds, BodiesAtRestBehindTheClipAreNotWhereTheyWereBeforeIt) {
     for (const std::vector<double>& frames :
          {std::vector<double>{0, 1, 2}, {-1, 0, 1, 2, 5}, {-1, 8}, {0.5, 2, 2.5}, {0.5, 1.5, 7}}) {
       const StrategyEntry& entry = find_strategy(id);
-      Session<float> session(scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::silent);
+      Session<float> session(scene, {&entry, {}, entry.info.topology.preferred});
       const Verification result = verified(session, scene, frames);
       EXPECT_EQ(result.first_violation, "") << id << ", " << frames.size() << " frames";
       EXPECT_EQ(result.audit.protrusion, 0) << id;
@@ -147,8 +147,7 @@ TEST(LinearBounds, BodiesThatMoveAsAWholeHaveTheirBoxesMoved) {
     EXPECT_LT(almost.last[Counter::bodies_translated], 7u) << id;
 
     for (const Scene<float>* scene : {&exact, &rounded}) {
-      Session<float> session(*scene, {&find_strategy(id), {}, find_strategy(id).info.topology.preferred},
-                             CountingPolicy::silent);
+      Session<float> session(*scene, {&find_strategy(id), {}, find_strategy(id).info.topology.preferred});
       const Verification result = verified(session, *scene, frame_times(*scene, 5));
       EXPECT_EQ(result.first_violation, "") << id;
       EXPECT_LT(result.audit.looseness(), 1e-3) << id;
@@ -244,10 +243,8 @@ std::vector<double> coordinates(Session<float>& session, std::uint32_t body) {
 
 TEST(IntervalJoinAhead, EqualsTheJoinAtOnceWhateverFramesThereAre) {
   const Scene<float> scene = waves(12, 8);
-  Session<float> ahead(scene, {&find_strategy("interval_join_ahead"), {}, {.width = 8, .leaf_size = 4}},
-                       CountingPolicy::silent);
-  Session<float> at_once(scene, {&find_strategy("interval_join"), {}, {.width = 8, .leaf_size = 4}},
-                         CountingPolicy::silent);
+  Session<float> ahead(scene, {&find_strategy("interval_join_ahead"), {}, {.width = 8, .leaf_size = 4}});
+  Session<float> at_once(scene, {&find_strategy("interval_join"), {}, {.width = 8, .leaf_size = 4}});
   PairBuffer pairs, expected;
   PhaseTimes times;
   // Knots met and missed, segments left out, some of them begun ahead; before the clip and after it; frames

@@ -29,7 +29,7 @@ struct Work {
 template <class S>
 Work work_of(const StrategyEntry& entry, const Scene<S>& scene) {
   Work work;
-  Session<S> session(scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::counting);
+  Session<S> session(scene, {&entry, {}, entry.info.topology.preferred});
   PhaseTimes times;
   PairBuffer pairs;
   std::uint64_t before = 0;

@@ -30,7 +30,7 @@ void expect_the_same_judgement(const char* id) {
   const std::vector<double> frames = world.frame_times(3);
   EXPECT_EQ(frames, frame_times(test.scene, 3));
   const StrategyEntry& entry = find_strategy(id);
-  Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::counting);
+  Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred});
   Oracle<S> oracle(test.scene);
   const Verification expected = verify(session, frames, oracle);
   const WorldVerdict found = world.verify(id, frames);

@@ -27,7 +27,7 @@ void expect_the_same(const StrategyEntry& entry, const char* name,
   const TestScene<S> test = synthetic_scene<S>(name, 3);
   if (!unsuitable_bodies(entry.info, test.scene).empty() || entry.factory<S>() == nullptr) return;
   const std::vector<double> frames = frame_times(test.scene, 3);
-  Session<S> session(test.scene, {&entry, params, entry.info.topology.preferred}, CountingPolicy::counting);
+  Session<S> session(test.scene, {&entry, params, entry.info.topology.preferred});
   World world = world_of(test.scene);
   world.start(entry.info.id, params, frames[0]);
   session.reset(frames[0]);
@@ -156,7 +156,7 @@ void expect_the_same_hits(const char* id) {
   SCOPED_TRACE(id);
   const StrategyEntry& entry = find_strategy(id);
   const TestScene<S> test = synthetic_scene<S>("soups", 3);
-  Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred}, CountingPolicy::counting);
+  Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred});
   World world = world_of(test.scene);
   const std::vector<double> frames = frame_times(test.scene, 3);
   world.start(id, {}, frames[0]);

@@ -98,7 +98,7 @@ class MotionOf final : public AnyMotion {
 /// A strategy whose methods are written in Python. The registration declares its abilities; the methods of
 /// the others are never called.
 template <class S>
-class PythonStrategy final : public CountedStrategy<S, Counting>,
+class PythonStrategy final : public CountedStrategy<S>,
                              public AnswersSelfPairs,
                              public AnswersSpans<S>,
                              public AnswersSweeps<S>,
@@ -106,7 +106,7 @@ class PythonStrategy final : public CountedStrategy<S, Counting>,
  public:
   PythonStrategy(std::size_t slot, std::string id, const SceneView<S>& scene, Playback<S>& playback,
                  Topologies topologies, const Params& params)
-      : CountedStrategy<S, Counting>(scene, SampledMotion<S>(playback)),
+      : CountedStrategy<S>(scene, SampledMotion<S>(playback)),
         id_(std::move(id)),
         topologies_(std::move(topologies)),
         motion_(scene, playback) {

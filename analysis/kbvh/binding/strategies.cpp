@@ -26,8 +26,7 @@ std::array<Slot, most_registered>& slots() {
 
 template <std::size_t slot, class S>
 std::unique_ptr<Strategy<S>> make_in_slot(const SceneView<S>& scene, Playback<S>& playback,
-                                          Topologies topologies, const Params& params,
-                                          CountingPolicy /*policy*/) {
+                                          Topologies topologies, const Params& params) {
   return std::make_unique<PythonStrategy<S>>(slot, slots()[slot].id, scene, playback, std::move(topologies),
                                              params);
 }

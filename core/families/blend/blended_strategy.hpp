@@ -45,13 +45,13 @@ class BlendedRows : public RowsOnDemand<S> {
 /// Frames cost O(terms) for each body, and O(terms) for each node that a query reads. Bodies at rest keep
 /// tight boxes; bodies whose vertices get plans of their own are refitted at every frame from then on, since
 /// their motion is no longer that of the clip.
-template <class S, class Count>
-class BlendedStrategy : public CountedStrategy<S, Count>, public AnswersRays<S>, public TakesPlanChanges<S> {
+template <class S>
+class BlendedStrategy : public CountedStrategy<S>, public AnswersRays<S>, public TakesPlanChanges<S> {
  public:
   static constexpr Foresight foresight = Foresight::whole_clip;
 
   BlendedStrategy(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies)
-      : CountedStrategy<S, Count>(scene, motion),
+      : CountedStrategy<S>(scene, motion),
         motion_(motion),
         near_bodies_(scene.pairs(), scene.body_count()),
         bodies_(scene.body_count()) {

@@ -31,11 +31,11 @@ namespace kbvh {
 /// Slots of the queue are first_slot + place for the initial bounds; later bounds get slots in chunks. Events
 /// are handled as by KineticAabbTree. Observers receive realiser_changed for own sides only, and no
 /// realiser_plan_changed.
-template <class S, class Queue, class Count, class Observer>
+template <class S, class Queue, class Observer>
 class BoxTreeCertificates : public BoxTreeBounds {
  public:
   BoxTreeCertificates(Topology topology, const Primitives& primitives, std::uint32_t body,
-                      std::uint32_t first_slot, EventClock<S>& clock, Queue& queue, Count& count,
+                      std::uint32_t first_slot, EventClock<S>& clock, Queue& queue, Counters& count,
                       Observer observer)
       : BoxTreeBounds(std::move(topology), primitives, body, first_slot),
         clock_(&clock),
@@ -45,7 +45,7 @@ class BoxTreeCertificates : public BoxTreeBounds {
         certifier_(clock, queue, count),
         search_(clock.plans(body).vertex_count()) {}
 
-  /// Returns the cost of all searches; counted only if `Count` counts.
+  /// Returns the cost of all searches.
   SearchCost& search_cost() { return search_cost_; }
   const SearchCost& search_cost() const { return search_cost_; }
 
@@ -126,7 +126,7 @@ class BoxTreeCertificates : public BoxTreeBounds {
         },
         [&](std::uint32_t vertex) { candidates_.push_back(vertex); });
     count_->add(Counter::nodes_visited, visited);
-    if constexpr (Count::enabled) search_cost_.add(visited);
+    search_cost_.add(visited);
     return candidates_;
   }
   /// Lists the candidates of all certificates, for the nodes in `order`. O(nodes).
@@ -147,7 +147,7 @@ class BoxTreeCertificates : public BoxTreeBounds {
             },
             [&](std::uint32_t vertex) { candidates_.push_back(vertex); });
         count_->add(Counter::nodes_visited, visited);
-        if constexpr (Count::enabled) search_cost_.add(visited);
+        search_cost_.add(visited);
         bound.vertices = std::uint32_t(list_.size());
         list_.insert(list_.end(), candidates_.begin(), candidates_.end());
         bound.last = std::uint32_t(list_.size());
@@ -210,9 +210,9 @@ class BoxTreeCertificates : public BoxTreeBounds {
 
   EventClock<S>* clock_;
   Queue* queue_;
-  Count* count_;
+  Counters* count_;
   Observer observer_;
-  Certifier<S, Queue, Count> certifier_;
+  Certifier<S, Queue> certifier_;
   CandidateSearch search_;
   SearchCost search_cost_;
 

@@ -19,9 +19,9 @@ namespace kbvh {
 /// certificates of new nodes are made, and, for each side, the one certificate whose search covers the edited
 /// place is recomputed. Further up, a certificate is recomputed if a realiser among its candidates has
 /// changed.
-template <class S, class Queue, class Count, class Observer = NoObserver>
-class KineticBoxTree : public BoxTreeCertificates<S, Queue, Count, Observer> {
-  using Base = BoxTreeCertificates<S, Queue, Count, Observer>;
+template <class S, class Queue, class Observer = NoObserver>
+class KineticBoxTree : public BoxTreeCertificates<S, Queue, Observer> {
+  using Base = BoxTreeCertificates<S, Queue, Observer>;
 
  protected:
   using Base::body_, Base::bounds_, Base::clock_, Base::count_, Base::editor_, Base::leaves_,
@@ -31,7 +31,7 @@ class KineticBoxTree : public BoxTreeCertificates<S, Queue, Count, Observer> {
  public:
   /// Throws std::invalid_argument if the topology is not binary.
   KineticBoxTree(Topology topology, const Primitives& primitives, std::uint32_t body,
-                 std::uint32_t first_slot, EventClock<S>& clock, Queue& queue, Count& count,
+                 std::uint32_t first_slot, EventClock<S>& clock, Queue& queue, Counters& count,
                  Observer observer = {})
       : Base(std::move(topology), primitives, body, first_slot, clock, queue, count, observer) {}
 
@@ -325,7 +325,7 @@ class KineticBoxTree : public BoxTreeCertificates<S, Queue, Count, Observer> {
 };
 
 /// The kinetic BoxTrees of all bodies of a scene on one event queue.
-template <class S, class Queue, class Count, class Observer = NoObserver>
-using KineticBoxForest = KineticForest<S, Queue, Count, Observer, KineticBoxTree>;
+template <class S, class Queue, class Observer = NoObserver>
+using KineticBoxForest = KineticForest<S, Queue, Observer, KineticBoxTree>;
 
 }  // namespace kbvh

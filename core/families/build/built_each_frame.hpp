@@ -10,15 +10,15 @@ namespace kbvh {
 /// The shared part of strategies that build what they search anew at every frame. `Body` is what is built for
 /// one body; it is default-constructible and has bytes(). Derived classes implement `build` and
 /// `find_candidates`. Bodies that cannot move are built at `reset` only.
-template <class S, class Count, class Body>
-class BuiltEachFrame : public CountedStrategy<S, Count>,
+template <class S, class Body>
+class BuiltEachFrame : public CountedStrategy<S>,
                        public AnswersSelfPairs,
                        public TakesPlanChanges<S>,
                        public TakesGeometryChanges<S> {
  public:
   static constexpr Foresight foresight = Foresight::none;
   BuiltEachFrame(const SceneView<S>& scene, const SampledMotion<S>& motion)
-      : CountedStrategy<S, Count>(scene, motion),
+      : CountedStrategy<S>(scene, motion),
         bodies_(scene.body_count()),
         near_bodies_(scene.pairs(), scene.body_count()) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body)

@@ -2,11 +2,7 @@
 
 namespace kbvh {
 
-template class BuiltEachFrame<float, Counting, BuiltTree<float>>;
-template class BuiltEachFrame<double, Counting, BuiltTree<double>>;
-#ifndef KBVH_COUNTING_ONLY
-template class BuiltEachFrame<float, Silent, BuiltTree<float>>;
-template class BuiltEachFrame<double, Silent, BuiltTree<double>>;
-#endif
+template class BuiltEachFrame<float, BuiltTree<float>>;
+template class BuiltEachFrame<double, BuiltTree<double>>;
 
 }  // namespace kbvh

@@ -16,9 +16,9 @@ namespace kbvh {
 ///   bytes()
 /// and may have searched(): the clusters searched by all builds, which are then counted. Of the given
 /// topologies, only the leaf size counts.
-template <class S, class Count, class Builder>
-class BuiltStrategy : public BuiltEachFrame<S, Count, BuiltTree<S>>, public AnswersRays<S>, public TellsWork {
-  using Base = BuiltEachFrame<S, Count, BuiltTree<S>>;
+template <class S, class Builder>
+class BuiltStrategy : public BuiltEachFrame<S, BuiltTree<S>>, public AnswersRays<S>, public TellsWork {
+  using Base = BuiltEachFrame<S, BuiltTree<S>>;
 
  protected:
   using Base::bodies_;
@@ -124,11 +124,7 @@ class BuiltStrategy : public BuiltEachFrame<S, Count, BuiltTree<S>>, public Answ
 };
 
 // Compiled once, in built_strategy.cpp, and not with every strategy.
-extern template class BuiltEachFrame<float, Counting, BuiltTree<float>>;
-extern template class BuiltEachFrame<double, Counting, BuiltTree<double>>;
-#ifndef KBVH_COUNTING_ONLY
-extern template class BuiltEachFrame<float, Silent, BuiltTree<float>>;
-extern template class BuiltEachFrame<double, Silent, BuiltTree<double>>;
-#endif
+extern template class BuiltEachFrame<float, BuiltTree<float>>;
+extern template class BuiltEachFrame<double, BuiltTree<double>>;
 
 }  // namespace kbvh

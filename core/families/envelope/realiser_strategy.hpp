@@ -14,13 +14,11 @@ namespace kbvh {
 
 /// The shared part of strategies that keep the realisers of a wide hierarchy's boxes instead of the boxes
 /// (RealiserRows). Queries run on the kernels of a refit's query.
-template <class S, class Count>
-class RealiserStrategy : public CountedStrategy<S, Count>, public AnswersRays<S> {
+template <class S>
+class RealiserStrategy : public CountedStrategy<S>, public AnswersRays<S> {
  public:
   RealiserStrategy(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies)
-      : CountedStrategy<S, Count>(scene, motion),
-        motion_(motion),
-        near_bodies_(scene.pairs(), scene.body_count()) {
+      : CountedStrategy<S>(scene, motion), motion_(motion), near_bodies_(scene.pairs(), scene.body_count()) {
     bodies_.resize(scene.body_count());
     for (std::uint32_t index = 0; index < scene.body_count(); ++index) {
       bodies_[index].rows.assign(std::move(topologies[index]), scene.primitives(index), active_kernel_set());

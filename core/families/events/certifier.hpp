@@ -14,12 +14,12 @@ namespace kbvh {
 /// Computes and schedules the failures of certificates for a kinetic tree. A certificate states that one
 /// vertex, its winner, is not behind any of its candidates on one side of a body. The certificate fails when
 /// the first candidate gets ahead. Certificates are passed as events with winner, slot, body, side and depth.
-template <class S, class Queue, class Count>
+template <class S, class Queue>
 class Certifier {
   using Clock = typename Queue::ClockType;
 
  public:
-  Certifier(Clock& clock, Queue& queue, Count& count) : clock_(&clock), queue_(&queue), count_(&count) {}
+  Certifier(Clock& clock, Queue& queue, Counters& count) : clock_(&clock), queue_(&queue), count_(&count) {}
 
   /// Returns the instant at which an event happens. Computes the exact time, into `crossing`, if `exact` is
   /// set, if the event lies in no segment, or if the body has per-vertex plans. Otherwise the segment
@@ -38,11 +38,14 @@ class Certifier {
   }
 
   /// Schedules the certificate's earliest failure from `now` on, and replaces the scheduled one. The winner
-  /// may be among the candidates. O(candidates x segments until the failure).
-  void certify(Event event, const Instant<S>& now, std::span<const std::uint32_t> candidates) {
+  /// may be among the candidates; `others` are the candidates without it, as far as the caller knows their
+  /// number. O(candidates x segments until the failure).
+  void certify(Event event, const Instant<S>& now, std::span<const std::uint32_t> candidates,
+               std::size_t others = not_counted) {
     withdraw(event.slot);  // the queue must not hold this slot while the clock stores its new crossing
     if constexpr (reads_keyframes)
-      if (!clock_->plans(event.body).has_own_plans()) return certify_keyframed(event, now, candidates);
+      if (!clock_->plans(event.body).has_own_plans())
+        return certify_keyframed(event, now, candidates, others);
     std::optional<Crossing<S>> own_crossing, earliest_crossing;
     Event earliest;
     bool found = false;
@@ -102,6 +105,7 @@ class Certifier {
   }
 
  private:
+  static constexpr std::size_t not_counted = std::numeric_limits<std::size_t>::max();
   static constexpr double never = std::numeric_limits<double>::infinity();
   static constexpr bool reads_keyframes = requires(const Clock& clock, const Instant<S>& now) {
     clock.keyframe_search(0, 0, now, 0.0);
@@ -134,10 +138,12 @@ class Certifier {
   }
 
   /// Implements `certify` for a body without per-vertex plans.
-  void certify_keyframed(Event event, const Instant<S>& now, std::span<const std::uint32_t> candidates) {
+  void certify_keyframed(Event event, const Instant<S>& now, std::span<const std::uint32_t> candidates,
+                         std::size_t others) {
     if (clock_->keyframe_count(event.body) < 2) return;
     const double horizon = horizon_after(event.body, now);
-    if (find_failure(event, clock_->keyframe_search(event.body, event.side, now, horizon), candidates))
+    if (find_failure(event, clock_->keyframe_search(event.body, event.side, now, horizon), candidates,
+                     others))
       return schedule(event);
     if (horizon == never) return;
     event.begin = horizon;
@@ -145,19 +151,17 @@ class Certifier {
     if (review_at(event, horizon)) {
       count_->add(Counter::queue_operations);
       count_->peak(Counter::queue_peak, queue_->size());
-    } else if (find_failure(event, clock_->keyframe_search(event.body, event.side, now, never), candidates)) {
+    } else if (find_failure(event, clock_->keyframe_search(event.body, event.side, now, never), candidates,
+                            others)) {
       schedule(event);
     }
   }
   /// Writes the earliest failure of a certificate to `event`. Returns whether there is one.
   template <class Search>
-  bool find_failure(Event& event, const Search& search, std::span<const std::uint32_t> candidates) {
+  bool find_failure(Event& event, const Search& search, std::span<const std::uint32_t> candidates,
+                    std::size_t others) {
     std::size_t limit = search.end, next = 0;
     bool found = false;
-    if constexpr (Count::enabled)
-      count_->add(
-          Counter::certificates_made,
-          candidates.size() - std::size_t(std::count(candidates.begin(), candidates.end(), event.winner)));
     for (;;) {
       const RowAhead ahead = search.next_ahead(candidates, next, event.winner, limit);
       if (ahead.index == candidates.size()) break;
@@ -168,6 +172,9 @@ class Certifier {
       event.loser = challenger;
       limit = ahead.at + 1;
     }
+    if (others == not_counted)
+      others = candidates.size() - search.rows->occurrences(candidates, event.winner);
+    count_->add(Counter::certificates_made, others);
     if (found) clock_->set_failure(event, limit - 1);
     return found;
   }
@@ -201,7 +208,7 @@ class Certifier {
 
   Clock* clock_;
   Queue* queue_;
-  Count* count_;
+  Counters* count_;
 };
 
 }  // namespace kbvh

@@ -41,6 +41,10 @@ class KeyframeRows {
     return kernels_->next_ahead[upper ? 1 : 0]({row(0, direction), times_.size()}, vertices.data(), first,
                                                vertices.size(), row(winner, direction), from, end);
   }
+  /// Returns how often a vertex is in a list.
+  std::uint32_t occurrences(std::span<const std::uint32_t> vertices, std::uint32_t vertex) const {
+    return kernels_->occurrences(vertices.data(), vertices.size(), vertex);
+  }
   std::size_t bytes() const { return values_.capacity() * sizeof(S); }
 
  private:

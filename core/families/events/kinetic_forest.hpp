@@ -11,16 +11,16 @@ namespace kbvh {
 
 /// The kinetic trees of all bodies of a scene on one event queue. KineticTree is the kind of tree: AABB
 /// trees, k-DOP trees (KineticDop), or others with the same interface.
-template <class S, class Queue, class Count, class Observer = NoObserver,
-          template <class, class, class, class> class KineticTree = KineticAabbTree>
+template <class S, class Queue, class Observer = NoObserver,
+          template <class, class, class> class KineticTree = KineticAabbTree>
 class KineticForest {
  public:
   using Scalar = S;
-  using Tree = KineticTree<S, Queue, Count, Observer>;
+  using Tree = KineticTree<S, Queue, Observer>;
   using Clock = typename Queue::ClockType;
 
-  KineticForest(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies, Count& count,
-                Observer observer = {})
+  KineticForest(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
+                Counters& count, Observer observer = {})
       : clock_(plans_of(scene, motion), directions()), queue_(clock_, slots_of(topologies)), count_(&count) {
     if (scene.body_count() > Event::most_bodies)
       throw std::length_error("a scene of " + std::to_string(scene.body_count()) +
@@ -149,7 +149,7 @@ class KineticForest {
 
   Clock clock_;
   Queue queue_;
-  Count* count_;
+  Counters* count_;
   std::vector<Tree> trees_;
   std::vector<std::pair<std::uint32_t, std::uint32_t>> changes_;  ///< body, vertex
   std::vector<std::uint32_t> changed_;                            ///< vertices of one body

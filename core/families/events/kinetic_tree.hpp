@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <numeric>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <type_traits>
 #include <vector>
@@ -41,7 +42,7 @@ namespace kbvh {
 /// Primitives can be inserted and removed at any time (as the paper claims). The topology is edited locally.
 /// Certificates are recomputed for the few nodes whose candidates changed, and for their ancestors as long as
 /// realisers change.
-template <class S, class Queue, class Count, class Observer, int K>
+template <class S, class Queue, class Observer, int K>
 class KineticTree {
   /// One bit for each side, and one more.
   using SideBits = std::conditional_t<K <= 7, std::uint8_t, std::uint32_t>;
@@ -52,7 +53,7 @@ class KineticTree {
   static constexpr const auto& directions = Dop<S, K>::directions;
 
   KineticTree(Topology topology, const Primitives& primitives, std::uint32_t body, std::uint32_t first_slot,
-              typename Queue::ClockType& clock, Queue& queue, Count& count, Observer observer = {})
+              typename Queue::ClockType& clock, Queue& queue, Counters& count, Observer observer = {})
       : topology_(std::move(topology)),
         leaf_vertices_(topology_, primitives),
         body_(body),
@@ -282,10 +283,18 @@ class KineticTree {
     event.side = side & 31U;
     event.depth = topology_.depths[node];
     const TopologyNode n = topology_.nodes[node];
-    if (n.is_leaf()) return certifier_.certify(event, now, leaf_vertices_[node]);
-    std::uint32_t candidates[8];  // children
-    for (std::uint32_t i = 0; i < n.count(); ++i) candidates[i] = realiser(n.first() + i, side);
-    certifier_.certify(event, now, {candidates, n.count()});
+    if (n.is_leaf()) {
+      const std::span<const std::uint32_t> vertices = leaf_vertices_[node];
+      KBVH_ASSERT(std::binary_search(vertices.begin(), vertices.end(), event.winner));
+      return certifier_.certify(event, now, vertices, vertices.size() - 1);
+    }
+    std::uint32_t candidates[8];  // of the children, without the winner: it may realise several
+    std::size_t others = 0;
+    for (std::uint32_t i = 0; i < n.count(); ++i) {
+      candidates[others] = realiser(n.first() + i, side);
+      if (candidates[others] != event.winner) ++others;
+    }
+    certifier_.certify(event, now, {candidates, others}, others);
   }
 
   std::uint32_t vertex_count() const { return clock_->plans(body_).vertex_count(); }
@@ -382,9 +391,9 @@ class KineticTree {
   CertificateSlots slots_;
   typename Queue::ClockType* clock_;
   Queue* queue_;
-  Count* count_;
+  Counters* count_;
   Observer observer_;
-  Certifier<S, Queue, Count> certifier_;
+  Certifier<S, Queue> certifier_;
   std::vector<std::uint32_t> realisers_;  ///< [node][side]
   // Allocated at the first change of plans.
   std::vector<std::uint32_t> touched_, marked_, affected_;
@@ -397,14 +406,14 @@ class KineticTree {
 };
 
 /// The kinetic AABB tree of the paper.
-template <class S, class Queue, class Count, class Observer = NoObserver>
-using KineticAabbTree = KineticTree<S, Queue, Count, Observer, 6>;
+template <class S, class Queue, class Observer = NoObserver>
+using KineticAabbTree = KineticTree<S, Queue, Observer, 6>;
 
 /// The kinetic k-DOP tree, as a template argument of KineticForest: KineticDop<18>::Tree.
 template <int K>
 struct KineticDop {
-  template <class S, class Queue, class Count, class Observer = NoObserver>
-  using Tree = KineticTree<S, Queue, Count, Observer, K>;
+  template <class S, class Queue, class Observer = NoObserver>
+  using Tree = KineticTree<S, Queue, Observer, K>;
 };
 
 }  // namespace kbvh

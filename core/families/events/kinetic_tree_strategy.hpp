@@ -27,8 +27,8 @@ enum class KineticQuery : std::uint8_t {
 /// A strategy of kinetic trees (Z&W s.4) alone: queries compute volumes from the realisers. `Forests` are the
 /// selectable kinds of KineticForest, of boxes or of k-DOPs. The clock of a forest's queue decides about
 /// events; k-DOPs need an EventClock. Queries of k-DOPs go node by node.
-template <class S, class Count, class... Forests>
-class KineticTreeStrategy : public CountedStrategy<S, Count>, public AnswersRays<S> {
+template <class S, class... Forests>
+class KineticTreeStrategy : public CountedStrategy<S>, public AnswersRays<S> {
   /// A forest, and the volumes of its trees at the current frame.
   template <class ForestType>
   struct Kind {
@@ -55,7 +55,7 @@ class KineticTreeStrategy : public CountedStrategy<S, Count>, public AnswersRays
   /// Uses the forest with index `kind` among Forests.
   KineticTreeStrategy(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
                       std::size_t kind, KineticQuery query)
-      : CountedStrategy<S, Count>(scene, motion),
+      : CountedStrategy<S>(scene, motion),
         motion_(motion),
         near_bodies_(scene.pairs(), scene.body_count()),
         by_rows_(query == KineticQuery::wide_rows),
@@ -93,13 +93,13 @@ class KineticTreeStrategy : public CountedStrategy<S, Count>, public AnswersRays
 
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& budget) override {
     QueryStatus status;
-    BoxTests tests;
+    std::uint64_t tests = 0;
     on_kind([&](auto& kind) {
       if constexpr (of_boxes<decltype(kind)>)
         if (by_rows_) {
           std::uint64_t reads = 0;
-          status = rows_.find(kind.forest, near_bodies_, this->scene_, this->sampled_, budget, out,
-                              tests.made, reads);
+          status =
+              rows_.find(kind.forest, near_bodies_, this->scene_, this->sampled_, budget, out, tests, reads);
           this->count_.add(Counter::positions_fetched, reads);
           return;
         }
@@ -109,18 +109,18 @@ class KineticTreeStrategy : public CountedStrategy<S, Count>, public AnswersRays
         volumes.ensure(0);
         return enclosing_box(volumes(0));
       };
-      for (const std::uint32_t i : near_bodies_.find(box_of, tests.made)) {
+      for (const std::uint32_t i : near_bodies_.find(box_of, tests)) {
         const BodyPair& pair = this->scene_.pairs()[i];
-        if (tests.made >= budget.box_tests) {
+        if (tests >= budget.box_tests) {
           ++status.pending;
           continue;
         }
         const auto &a = kind.forest.tree(pair.first), &b = kind.forest.tree(pair.second);
-        LeafPairs<S, BoxTests> leaves(this->scene_, this->sampled_, pair.first, a.topology(), pair.second,
-                                      b.topology(), tests, out);
+        LeafPairs<S> leaves(this->scene_, this->sampled_, pair.first, a.topology(), pair.second, b.topology(),
+                            tests, out);
         const auto compare = [&](auto&& volumes_a, auto&& volumes_b) {
           status.pending += traverse(a.topology(), volumes_a, b.topology(), volumes_b, stack_, tests,
-                                     rest_of(budget, tests.made), leaves)
+                                     rest_of(budget, tests), leaves)
                                 .pending;
         };
         if constexpr (!of_boxes<decltype(kind)>)
@@ -131,7 +131,7 @@ class KineticTreeStrategy : public CountedStrategy<S, Count>, public AnswersRays
         compare(view(kind, pair.first), view(kind, pair.second));
       }
     });
-    this->count_.add(Counter::box_tests, tests.made);
+    this->count_.add(Counter::box_tests, tests);
     return status;
   }
 
@@ -187,20 +187,19 @@ class KineticTreeStrategy : public CountedStrategy<S, Count>, public AnswersRays
         volumes.ensure(0);
         return to_double(enclosing_box(volumes(0)));
       };
-      const std::uint64_t tests =
-          find_hits_by_body(this->scene_, this->sampled_, query, rays, hits, ray_order_, this->ray_bodies(),
-                            box_of, [&](std::uint32_t body, RaySearch<S>& search) {
-                              const Topology& topology = kind.forest.tree(body).topology();
-                              auto&& volumes = view(kind, body);
-                              const TopologyTree tree{topology, [&](std::uint32_t node) {
-                                                        volumes.ensure(node);
-                                                        return enclosing_box(volumes(node));
-                                                      }};
-                              return follow_ray(tree, search, body, this->scene_.primitives(body),
-                                                this->sampled_.positions(body), ray_stack_, this->count_,
-                                                this->triangle_stats_);
-                            });
-      this->count_.add(Counter::box_tests, tests);
+      const std::uint64_t all = find_hits_by_body(
+          this->scene_, this->sampled_, query, rays, hits, ray_order_, this->ray_bodies(), box_of,
+          [&](std::uint32_t body, RaySearch<S>& search, std::uint64_t& tests) {
+            const Topology& topology = kind.forest.tree(body).topology();
+            auto&& volumes = view(kind, body);
+            const TopologyTree tree{topology, [&](std::uint32_t node) {
+                                      volumes.ensure(node);
+                                      return enclosing_box(volumes(node));
+                                    }};
+            return follow_ray(tree, search, body, this->scene_.primitives(body),
+                              this->sampled_.positions(body), ray_stack_, tests, this->triangle_stats_);
+          });
+      this->count_.add(Counter::box_tests, all);
     });
   }
 
@@ -291,13 +290,13 @@ class KineticTreeStrategy : public CountedStrategy<S, Count>, public AnswersRays
 
 /// A KineticTreeStrategy on exact clocks (EventClock): plans and geometry may change, and events can be
 /// stepped.
-template <class S, class Count, class... Forests>
-class ExactKineticTreeStrategy : public KineticTreeStrategy<S, Count, Forests...>,
+template <class S, class... Forests>
+class ExactKineticTreeStrategy : public KineticTreeStrategy<S, Forests...>,
                                  public EventSource<S>,
                                  public TakesPlanChanges<S>,
                                  public TakesGeometryChanges<S> {
  public:
-  using KineticTreeStrategy<S, Count, Forests...>::KineticTreeStrategy;
+  using KineticTreeStrategy<S, Forests...>::KineticTreeStrategy;
 
   std::optional<ScheduledEvent<S>> next_event() const override {
     return this->on_forest([](auto& forest) {
@@ -329,11 +328,9 @@ class ExactKineticTreeStrategy : public KineticTreeStrategy<S, Count, Forests...
 };
 
 /// Kinetic AABB trees on one of several queues.
-template <class S, class Count, class... Queues>
-using KineticAabbStrategy =
-    KineticTreeStrategy<S, Count, KineticForest<S, Queues, Count, BoundObserver<S>>...>;
-template <class S, class Count, class... Queues>
-using ExactKineticAabbStrategy =
-    ExactKineticTreeStrategy<S, Count, KineticForest<S, Queues, Count, BoundObserver<S>>...>;
+template <class S, class... Queues>
+using KineticAabbStrategy = KineticTreeStrategy<S, KineticForest<S, Queues, BoundObserver<S>>...>;
+template <class S, class... Queues>
+using ExactKineticAabbStrategy = ExactKineticTreeStrategy<S, KineticForest<S, Queues, BoundObserver<S>>...>;
 
 }  // namespace kbvh

@@ -85,6 +85,7 @@ class LinearBounds {
   S fraction(double t) const { return segment().fraction(t); }
   const BodySegmentBounds<S>& side(std::uint32_t body) const { return segment().sides[body]; }
   WideHierarchy<S>& hierarchy(std::uint32_t body) { return bodies_[body].hierarchy; }
+  const WideHierarchy<S>& hierarchy(std::uint32_t body) const { return bodies_[body].hierarchy; }
 
   std::uint32_t body_count() const { return std::uint32_t(bodies_.size()); }
   std::uint32_t vertex_count(std::uint32_t body) const { return scene_.vertex_count(body); }
@@ -204,12 +205,11 @@ class LinearCounts {
   void skip(const LinearBounds<S>& bounds) {
     for (std::uint32_t body = 0; body < bounds.body_count(); ++body) before_[body] = bounds.counts(body);
   }
-  /// Counts the work since the last call.
-  template <class Count>
-  void add_to(Count& count, LinearBounds<S>& bounds) {
+  /// Adds the work since then.
+  void add_to(Counters& count, const LinearBounds<S>& bounds) const {
     for (std::uint32_t body = 0; body < bounds.body_count(); ++body) {
       const auto& hierarchy = bounds.hierarchy(body);
-      const auto now = bounds.counts(body), before = std::exchange(before_[body], now);
+      const auto &now = bounds.counts(body), &before = before_[body];
       const std::uint64_t nodes = hierarchy.topology().size();
       // Parts of refits, such that they add up to whole refits.
       const auto refitted = [&](std::uint64_t all) {

@@ -9,11 +9,11 @@ namespace kbvh {
 
 /// The shared part of strategies that refit at every frame and restructure by exchanging the primitives of
 /// leaves. A derived class implements `update(body)`; the queries of a frame add to the age of both trees.
-template <class S, class Count>
-class LeafStrategy : public StoredHierarchyStrategy<S, Count>,
+template <class S>
+class LeafStrategy : public StoredHierarchyStrategy<S>,
                      public AnswersSelfPairs,
                      public TakesGeometryChanges<S> {
-  using Base = StoredHierarchyStrategy<S, Count>;
+  using Base = StoredHierarchyStrategy<S>;
 
  public:
   LeafStrategy(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,

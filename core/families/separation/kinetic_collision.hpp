@@ -17,15 +17,15 @@ namespace kbvh {
 /// displacements do not meet. The end of a window is an event that opens the next window. A window is halved
 /// while it holds many more pairs than bodies plus pairs that meet at its begin. The next window is twice as
 /// long if the current one holds few pairs.
-template <class S, template <class> class Queue, class Count>
+template <class S, template <class> class Queue>
 class KineticCollision {
  public:
-  using Forest = KineticForest<S, Queue<EventClock<S>>, Count, WatchedBoxes<S>>;
-  using List = SeparationList<S, Queue, Count>;
+  using Forest = KineticForest<S, Queue<EventClock<S>>, WatchedBoxes<S>>;
+  using List = SeparationList<S, Queue>;
 
   /// `queue` names the kind of both queues, where `Queue` offers a choice.
   KineticCollision(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
-                   Count& count, int look_ahead = OverlapClock<S>::usual_look_ahead,
+                   Counters& count, int look_ahead = OverlapClock<S>::usual_look_ahead,
                    std::string_view queue = {})
       : motion_(motion),
         near_bodies_(scene.pairs(), scene.body_count()),
@@ -344,7 +344,7 @@ class KineticCollision {
   ClipMotion<S> motion_;
   NearBodies near_bodies_;
   std::span<const BodyPair> body_pairs_;  ///< body pairs of the scene
-  Count* count_;
+  Counters* count_;
   BoundWatch<S> watch_;
   std::vector<ChangedBoxes::Box> changed_;
   std::vector<ChangedBoxes::Node> nodes_;

@@ -58,7 +58,7 @@ struct ListEdit {
 /// overlap before the current segment ends. `open_segment` checks all pairs without an event when the next
 /// segment begins. Most of them are decided by the signs of their gaps at the segment's ends
 /// (SegmentOverlap).
-template <class S, template <class> class Queue, class Count>
+template <class S, template <class> class Queue>
 class SeparationList {
   using Event = OverlapEvent<S>;
 
@@ -70,7 +70,7 @@ class SeparationList {
 
   /// `queue` names the kind of queue, where `Queue` offers a choice.
   template <class Forest>
-  SeparationList(const SceneView<S>& scene, const Forest& forest, Count& count, int look_ahead,
+  SeparationList(const SceneView<S>& scene, const Forest& forest, Counters& count, int look_ahead,
                  BodyPairs pairs, std::string_view queue = {})
       : tree_(forest_topologies(scene, forest), scene.pairs()),
         outlook_(scene, forest, tree_,
@@ -484,7 +484,7 @@ class SeparationList {
   PairTree tree_;
   PairOutlook<S> outlook_;
   Queue<OverlapClock<S>> queue_;
-  Count* count_;
+  Counters* count_;
   LeafOverlaps leaves_;
   std::size_t list_size_ = 0;
   std::vector<std::uint32_t> roots_;                    ///< slot of each body pair's root pair, or none

@@ -50,8 +50,8 @@ class DopHierarchy {
   /// overlap; within one body, for each two leaves once and for each leaf with itself. Counts the tests.
   /// Returns the pairs of nodes that the budget left undone.
   template <class OnLeaves>
-  static std::size_t search(const DopHierarchy& a, const DopHierarchy& b, Scratch& scratch, BoxTests& tests,
-                            const Budget& budget, OnLeaves&& on_leaves) {
+  static std::size_t search(const DopHierarchy& a, const DopHierarchy& b, Scratch& scratch,
+                            std::uint64_t& tests, const Budget& budget, OnLeaves&& on_leaves) {
     if (a.empty() || b.empty()) return 0;
     DopSearch<S> job{a.nodes_.data(),
                      b.nodes_.data(),
@@ -64,7 +64,7 @@ class DopHierarchy {
                      scratch.found.data(),
                      0,
                      scratch.found.size(),
-                     tests.made + 1,
+                     tests + 1,
                      budget.box_tests};
     if (&a == &b || a.kernels_->overlap(K)(job.sides_a, job.sides_b)) job.stack[job.depth++] = {0, 0};
     while (job.depth > 0 && job.tests < job.most_tests) {
@@ -74,12 +74,12 @@ class DopHierarchy {
         job.stack_room = scratch.stack.size();
       }
       a.kernels_->search(K)(job);
-      tests.made = job.tests;  // `on_leaves` adds its own
+      tests = job.tests;  // `on_leaves` adds its own
       for (std::size_t i = 0; i < job.found_count; ++i) on_leaves(job.found[i].a, job.found[i].b);
       job.found_count = 0;
-      job.tests = tests.made;
+      job.tests = tests;
     }
-    tests.made = job.tests;
+    tests = job.tests;
     return job.depth;
   }
 

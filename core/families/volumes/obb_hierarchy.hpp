@@ -55,7 +55,8 @@ class ObbHierarchy {
   /// Appends the pairs of primitives of two bodies, or of one, whose boxes overlap and all oriented boxes
   /// above them. Counts the tests. Returns the pairs of nodes that the budget left undone.
   static std::size_t find_pairs(ObbHierarchy& a, std::uint32_t body_a, ObbHierarchy& b, std::uint32_t body_b,
-                                Scratch& scratch, BoxTests& tests, const Budget& budget, PairBuffer& out);
+                                Scratch& scratch, std::uint64_t& tests, const Budget& budget,
+                                PairBuffer& out);
 
  private:
   void choose_frames();

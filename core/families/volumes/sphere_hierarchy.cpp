@@ -119,16 +119,17 @@ std::size_t SphereHierarchy<S, bounds>::bytes() const {
 template <class S, SphereBounds bounds>
 std::size_t SphereHierarchy<S, bounds>::find_pairs(SphereHierarchy& a, std::uint32_t body_a,
                                                    SphereHierarchy& b, std::uint32_t body_b, Scratch& scratch,
-                                                   BoxTests& tests, const Budget& budget, PairBuffer& out) {
+                                                   std::uint64_t& tests, const Budget& budget,
+                                                   PairBuffer& out) {
   if (a.empty() || b.empty()) return 0;
   const bool overlap = a.kernels_->overlap(a.own_.data(), b.own_.data());
   LaneSearch<S> search({&a.tree_, a.placed_, body_a}, {&b.tree_, b.placed_, body_b}, a.set_, scratch, budget,
-                       tests.made);
+                       tests);
   const SpherePair<S> pair{a.tree_.nodes(), b.tree_.nodes(), a.rows_.data(), b.rows_.data(), b.own_.data()};
   const auto step = body_a == body_b ? a.kernels_->within : a.kernels_->traverse;
   const std::size_t pending = search.run(
       overlap, [&](WideTraversal& state) { step(pair, state); }, out);
-  tests.made = search.tests();
+  tests = search.tests();
   return pending;
 }
 

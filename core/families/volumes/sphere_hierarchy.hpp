@@ -51,8 +51,8 @@ class SphereHierarchy {
   /// Appends the pairs of primitives of two bodies, or of one, whose boxes overlap and all spheres above
   /// them. Counts the tests. Returns the pairs of nodes that the budget left undone.
   static std::size_t find_pairs(SphereHierarchy& a, std::uint32_t body_a, SphereHierarchy& b,
-                                std::uint32_t body_b, Scratch& scratch, BoxTests& tests, const Budget& budget,
-                                PairBuffer& out);
+                                std::uint32_t body_b, Scratch& scratch, std::uint64_t& tests,
+                                const Budget& budget, PairBuffer& out);
 
  private:
   void refit_without_kernels();

@@ -101,12 +101,12 @@ class VolumeHierarchy {
   /// Returns the pairs of nodes that the budget left undone.
   template <class OnLeaves>
   static std::size_t search(const VolumeHierarchy& a, const VolumeHierarchy& b, Scratch& scratch,
-                            BoxTests& tests, const Budget& budget, OnLeaves&& on_leaves) {
+                            std::uint64_t& tests, const Budget& budget, OnLeaves&& on_leaves) {
     const auto once = [&](std::uint32_t leaf_a, std::uint32_t leaf_b) {
       if (&a != &b || leaf_a <= leaf_b) on_leaves(leaf_a, leaf_b);
     };
     return traverse(a.topology(), Stored{a}, b.topology(), Stored{b}, scratch.stack, tests,
-                    rest_of(budget, tests.made), once)
+                    rest_of(budget, tests), once)
         .pending;
   }
 

@@ -14,8 +14,8 @@ namespace kbvh {
 /// The shared part of strategies over hierarchies of bounding volumes: every volume of a moving body is
 /// recomputed at each frame, leaves first. `Hierarchies` lists the kinds; an instance uses one. Each is one
 /// body's hierarchy, as VolumeHierarchy and DopHierarchy are.
-template <class S, class Count, class... Hierarchies>
-class HierarchyStrategy : public CountedStrategy<S, Count>,
+template <class S, class... Hierarchies>
+class HierarchyStrategy : public CountedStrategy<S>,
                           public AnswersRays<S>,
                           public TakesPlanChanges<S>,
                           public TakesGeometryChanges<S>,
@@ -32,7 +32,7 @@ class HierarchyStrategy : public CountedStrategy<S, Count>,
   /// `kind` is the index of the used kind among Hierarchies.
   HierarchyStrategy(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
                     std::size_t kind)
-      : CountedStrategy<S, Count>(scene, motion), near_bodies_(scene.pairs(), scene.body_count()) {
+      : CountedStrategy<S>(scene, motion), near_bodies_(scene.pairs(), scene.body_count()) {
     std::size_t index = 0;
     (void)((index++ == kind && (state_.template emplace<State<Hierarchies>>(), true)) || ...);
     const std::vector<Cover> cover = covers(scene);
@@ -64,9 +64,9 @@ class HierarchyStrategy : public CountedStrategy<S, Count>,
 
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& budget) override {
     QueryStatus status;
-    BoxTests tests;
+    std::uint64_t tests = 0;
     std::visit([&](auto& state) { search(state, out, tests, budget, status); }, state_);
-    this->count_.add(Counter::box_tests, tests.made);
+    this->count_.add(Counter::box_tests, tests);
     return status;
   }
 
@@ -115,17 +115,16 @@ class HierarchyStrategy : public CountedStrategy<S, Count>,
       const auto box_of = [&](std::uint32_t body) {
         return bodies[body].empty() ? Box<double>{} : to_double(enclosing_box(bodies[body].volume(0)));
       };
-      const std::uint64_t tests =
-          find_hits_by_body(this->scene_, this->sampled_, query, rays, hits, ray_order_, this->ray_bodies(),
-                            box_of, [&](std::uint32_t body, RaySearch<S>& search) {
-                              const TopologyTree tree{bodies[body].topology(), [&](std::uint32_t node) {
-                                                        return enclosing_box(bodies[body].volume(node));
-                                                      }};
-                              return follow_ray(tree, search, body, this->scene_.primitives(body),
-                                                this->sampled_.positions(body), ray_stack_, this->count_,
-                                                this->triangle_stats_);
-                            });
-      this->count_.add(Counter::box_tests, tests);
+      const std::uint64_t all = find_hits_by_body(
+          this->scene_, this->sampled_, query, rays, hits, ray_order_, this->ray_bodies(), box_of,
+          [&](std::uint32_t body, RaySearch<S>& search, std::uint64_t& tests) {
+            const TopologyTree tree{bodies[body].topology(), [&](std::uint32_t node) {
+                                      return enclosing_box(bodies[body].volume(node));
+                                    }};
+            return follow_ray(tree, search, body, this->scene_.primitives(body),
+                              this->sampled_.positions(body), ray_stack_, tests, this->triangle_stats_);
+          });
+      this->count_.add(Counter::box_tests, all);
     });
   }
 
@@ -141,15 +140,15 @@ class HierarchyStrategy : public CountedStrategy<S, Count>,
 
  private:
   template <class Hierarchy>
-  void search(State<Hierarchy>& state, PairBuffer& out, BoxTests& tests, const Budget& budget,
+  void search(State<Hierarchy>& state, PairBuffer& out, std::uint64_t& tests, const Budget& budget,
               QueryStatus& status) {
     auto& bodies = state.bodies;
     const auto box_of = [&](std::uint32_t body) {
       return bodies[body].empty() ? Box<double>{} : enclosing_box(bodies[body].volume(0));
     };
-    for (const std::uint32_t i : near_bodies_.find(box_of, tests.made)) {
+    for (const std::uint32_t i : near_bodies_.find(box_of, tests)) {
       const BodyPair& pair = this->scene_.pairs()[i];
-      if (tests.made >= budget.box_tests) {
+      if (tests >= budget.box_tests) {
         ++status.pending;
         continue;
       }
@@ -158,8 +157,8 @@ class HierarchyStrategy : public CountedStrategy<S, Count>,
         status.pending +=
             Hierarchy::find_pairs(a, pair.first, b, pair.second, state.scratch, tests, budget, out);
       } else {
-        LeafPairs<S, BoxTests> leaves(this->scene_, this->sampled_, pair.first, a.topology(), pair.second,
-                                      b.topology(), tests, out);
+        LeafPairs<S> leaves(this->scene_, this->sampled_, pair.first, a.topology(), pair.second, b.topology(),
+                            tests, out);
         status.pending += Hierarchy::search(a, b, state.scratch, tests, budget, leaves);
       }
     }
@@ -207,7 +206,7 @@ class HierarchyStrategy : public CountedStrategy<S, Count>,
 /// A simple strategy over bounding volumes of any kind, which compares them by the template traversal
 /// (core/topology/traversal.hpp). Nothing is specialised for speed; the wide hierarchies of boxes and
 /// DopHierarchy are fast special cases.
-template <class S, class Count, BoundingVolume... Volumes>
-using VolumeStrategy = HierarchyStrategy<S, Count, VolumeHierarchy<Volumes>...>;
+template <class S, BoundingVolume... Volumes>
+using VolumeStrategy = HierarchyStrategy<S, VolumeHierarchy<Volumes>...>;
 
 }  // namespace kbvh

@@ -13,14 +13,6 @@ inline Budget rest_of(const Budget& budget, std::uint64_t tests) {
   return {tests < budget.box_tests ? budget.box_tests - tests : 0};
 }
 
-/// A counting policy that counts only box tests, for comparison with a budget.
-struct BoxTests {
-  std::uint64_t made = 0;
-  void add(Counter counter, std::uint64_t n = 1) {
-    if (counter == Counter::box_tests) made += n;
-  }
-};
-
 /// The broad phase over bodies: selects the pairs of bodies that a query must visit. Scenes with few pairs
 /// are not searched: all their pairs count as near. Scenes with many small bodies have a tree over the
 /// bodies' boxes, refitted at each search and rebuilt when the bodies have mixed; a search joins the tree

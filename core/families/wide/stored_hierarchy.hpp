@@ -23,10 +23,8 @@ inline Box<S> leaf_box(std::span<const std::uint32_t> vertices, const S* positio
 /// The shared part of strategies with stored boxes, including pairs and rays: a derived class only implements
 /// `update(body)`. Bodies that cannot move are updated at `reset` only. Most strategies derive from
 /// StoredHierarchyStrategy, which also accepts changes of plans.
-template <class S, class Count>
-class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count>,
-                                    public AnswersRays<S>,
-                                    public TellsWork {
+template <class S>
+class FixedPlansHierarchyStrategy : public CountedStrategy<S>, public AnswersRays<S>, public TellsWork {
  public:
   FixedPlansHierarchyStrategy(const SceneView<S>& scene, const SampledMotion<S>& motion,
                               Topologies topologies, const Params& /*params*/,
@@ -180,13 +178,12 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S, Count>,
   std::optional<SweptHierarchies<S>> swept_;  ///< made at the first request for contacts
 };
 
-template <class S, class Count>
-FixedPlansHierarchyStrategy<S, Count>::FixedPlansHierarchyStrategy(const SceneView<S>& scene,
-                                                                   const SampledMotion<S>& motion,
-                                                                   Topologies topologies,
-                                                                   const Params& /*params*/,
-                                                                   KernelSet kernels)
-    : CountedStrategy<S, Count>(scene, motion), near_bodies_(scene.pairs(), scene.body_count()) {
+template <class S>
+FixedPlansHierarchyStrategy<S>::FixedPlansHierarchyStrategy(const SceneView<S>& scene,
+                                                            const SampledMotion<S>& motion,
+                                                            Topologies topologies, const Params& /*params*/,
+                                                            KernelSet kernels)
+    : CountedStrategy<S>(scene, motion), near_bodies_(scene.pairs(), scene.body_count()) {
   hierarchies_.resize(scene.body_count());
   for (std::uint32_t body = 0; body < scene.body_count(); ++body)
     hierarchies_[body].assign(std::move(topologies[body]), scene.primitives(body), kernels);
@@ -194,14 +191,14 @@ FixedPlansHierarchyStrategy<S, Count>::FixedPlansHierarchyStrategy(const SceneVi
       scene.pairs(), [&](std::uint32_t body) -> const auto& { return hierarchies_[body]; });
 }
 
-template <class S, class Count>
-FixedPlansHierarchyStrategy<S, Count>::~FixedPlansHierarchyStrategy() = default;
+template <class S>
+FixedPlansHierarchyStrategy<S>::~FixedPlansHierarchyStrategy() = default;
 
 /// The same for plans that change, too.
-template <class S, class Count>
-class StoredHierarchyStrategy : public FixedPlansHierarchyStrategy<S, Count>, public TakesPlanChanges<S> {
+template <class S>
+class StoredHierarchyStrategy : public FixedPlansHierarchyStrategy<S>, public TakesPlanChanges<S> {
  public:
-  using FixedPlansHierarchyStrategy<S, Count>::FixedPlansHierarchyStrategy;
+  using FixedPlansHierarchyStrategy<S>::FixedPlansHierarchyStrategy;
 
  protected:
   /// The strategy reads only positions; it only records that no body is certain to rest.
@@ -211,15 +208,9 @@ class StoredHierarchyStrategy : public FixedPlansHierarchyStrategy<S, Count>, pu
 };
 
 // Compiled once, in stored_hierarchy.cpp, and not with every strategy.
-extern template class StoredHierarchyStrategy<float, Counting>;
-extern template class StoredHierarchyStrategy<double, Counting>;
-extern template class FixedPlansHierarchyStrategy<float, Counting>;
-extern template class FixedPlansHierarchyStrategy<double, Counting>;
-#ifndef KBVH_COUNTING_ONLY
-extern template class StoredHierarchyStrategy<float, Silent>;
-extern template class StoredHierarchyStrategy<double, Silent>;
-extern template class FixedPlansHierarchyStrategy<float, Silent>;
-extern template class FixedPlansHierarchyStrategy<double, Silent>;
-#endif
+extern template class StoredHierarchyStrategy<float>;
+extern template class StoredHierarchyStrategy<double>;
+extern template class FixedPlansHierarchyStrategy<float>;
+extern template class FixedPlansHierarchyStrategy<double>;
 
 }  // namespace kbvh

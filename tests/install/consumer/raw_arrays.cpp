@@ -29,8 +29,7 @@ int main() {
 
   std::printf("%zu strategies\n", kbvh::registry().size());
   const kbvh::StrategyEntry& entry = kbvh::find_strategy("bottom_up");
-  kbvh::Session<float> session(scene, {&entry, {}, entry.info.topology.preferred},
-                               kbvh::CountingPolicy::silent);
+  kbvh::Session<float> session(scene, {&entry, {}, entry.info.topology.preferred});
   kbvh::PhaseTimes times;
   kbvh::PairBuffer pairs;
   session.reset(0);

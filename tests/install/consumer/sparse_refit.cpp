@@ -8,9 +8,9 @@
 
 namespace {
 
-template <class S, class Count>
-class SparseRefit final : public kbvh::StoredHierarchyStrategy<S, Count> {
-  using Base = kbvh::StoredHierarchyStrategy<S, Count>;
+template <class S>
+class SparseRefit final : public kbvh::StoredHierarchyStrategy<S> {
+  using Base = kbvh::StoredHierarchyStrategy<S>;
   using Counter = kbvh::Counter;
 
  public:

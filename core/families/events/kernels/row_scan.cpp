@@ -39,8 +39,14 @@ RowAhead next_ahead(RowTable<S> rows, const std::uint32_t* vertices, std::size_t
   return {count, end};
 }
 
+std::uint32_t occurrences(const std::uint32_t* vertices, std::size_t count, std::uint32_t vertex) {
+  std::uint32_t found = 0;
+  for (std::size_t i = 0; i < count; ++i) found += vertices[i] == vertex ? 1U : 0U;
+  return found;
+}
+
 template <class S>
-constexpr RowScanKernels<S> table{&first_above<S>, {&next_ahead<S, 0>, &next_ahead<S, 1>}};
+constexpr RowScanKernels<S> table{&first_above<S>, {&next_ahead<S, 0>, &next_ahead<S, 1>}, &occurrences};
 
 }  // namespace
 

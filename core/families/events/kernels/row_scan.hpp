@@ -30,6 +30,8 @@ struct RowScanKernels {
   /// [1] above it, [0] below it. May read `row_padding` numbers past `end`.
   RowAhead (*next_ahead[2])(RowTable<S> rows, const std::uint32_t* vertices, std::size_t first,
                             std::size_t count, const S* winner, std::size_t from, std::size_t end);
+  /// Returns how often `vertex` is in a list of `count`.
+  std::uint32_t (*occurrences)(const std::uint32_t* vertices, std::size_t count, std::uint32_t vertex);
 };
 /// The largest number of values of a row that are read at once.
 inline constexpr std::size_t row_padding = 16;
