@@ -396,24 +396,23 @@ class Auto final : public Strategy<S>,
   /// Returns the work of the join in a frame of its window, which is of whole segments.
   double joined_work() const {
     using Work = costs::Work;
-    const Counters counters = runners_[active_].strategy->counters();
     const double frames = frame_ - window_.frame;
     const TellsWork* work = runners_[active_].work;
     const double boxes = work != nullptr ? double(work->last_box_tests()) : 0;
-    const double in_frames =
-        Work::span_test * double(span_tests() - window_.span_tests) +
-        Work::join_triangle_test * double(counters[Counter::triangle_tests] - window_.triangle_tests) +
-        Work::join_fetch * double(this->sampled_.fetched() - window_.fetched);
+    const double in_frames = Work::span_test * double(span_tests() - window_.span_tests) +
+                             Work::join_triangle_test * double(frame_tests() - window_.frame_tests) +
+                             Work::join_fetch * double(this->sampled_.fetched() - window_.fetched);
     return (Work::join_read * seen_.reads + Work::join_box_test * boxes) / seen_.frames_per_segment +
            in_frames / frames;
   }
-  void begin_window() {
-    const Counters counters = runners_[active_].strategy->counters();
-    window_ = {false, frame_, span_tests(), counters[Counter::triangle_tests], this->sampled_.fetched()};
-  }
+  void begin_window() { window_ = {false, frame_, span_tests(), frame_tests(), this->sampled_.fetched()}; }
   std::uint64_t span_tests() const {
     const TellsWork* work = runners_[active_].work;
     return work != nullptr ? work->span_tests() : 0;
+  }
+  std::uint64_t frame_tests() const {
+    const TellsWork* work = runners_[active_].work;
+    return work != nullptr ? work->frame_tests() : 0;
   }
 
   void fetch_all() {
@@ -487,7 +486,7 @@ class Auto final : public Strategy<S>,
   struct Window {
     bool begins = false;  ///< before the strategy advances
     int frame = none;
-    std::uint64_t span_tests = 0, triangle_tests = 0, fetched = 0;  ///< until then
+    std::uint64_t span_tests = 0, frame_tests = 0, fetched = 0;  ///< until then
   };
   SegmentMotion<S> motion_;
   ObservedMotion<S> steps_;

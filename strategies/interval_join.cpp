@@ -238,6 +238,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S>,
     return tests;
   }
 
+  std::uint64_t frame_tests() const override { return this->triangle_stats_.tests; }
   std::uint64_t span_tests() const override {
     std::uint64_t tests = 0;
     for (const Joins<S>* one : {&now_, &next_})

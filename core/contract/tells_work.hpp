@@ -19,6 +19,9 @@ class TellsWork {
   virtual std::uint64_t last_ray_tests() const { return 0; }
   /// Returns the attempts to decide a pair of triangles for a span of time, since the last reset.
   virtual std::uint64_t span_tests() const { return 0; }
+  /// Returns the pairs of triangles decided at single frames, since the last reset; 0 if it does not tell.
+  /// What counters() has, too, but without memory for a table.
+  virtual std::uint64_t frame_tests() const { return 0; }
 };
 
 }  // namespace kbvh
