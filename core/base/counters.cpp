@@ -25,6 +25,12 @@ const char* meaning(Counter counter) {
   return counter < Counter::count ? texts[std::size_t(counter)].meaning : "?";
 }
 
+void Counters::NamedList::push_back(const Named& counter) {
+  if (size_ == most)
+    throw std::length_error("a strategy has more than " + std::to_string(most) + " counters of its own");
+  counters_[size_++] = counter;
+}
+
 void Counters::add(std::string_view own_name, std::uint64_t n) {
   for (Named& counter : named)
     if (counter.name == own_name) {

@@ -69,9 +69,27 @@ struct Counters {
     std::string_view name;  ///< snake_case; must outlive the table: a string literal
     std::uint64_t value = 0;
   };
-  std::vector<Named> named{};
+  /// A list without memory of its own, so that tables can be read in a frame: no allocation.
+  class NamedList {
+   public:
+    static constexpr std::size_t most = 32;
+    /// Throws std::length_error beyond `most`.
+    void push_back(const Named& counter);
+    std::size_t size() const { return size_; }
+    bool empty() const { return size_ == 0; }
+    Named* begin() { return counters_.data(); }
+    Named* end() { return counters_.data() + size_; }
+    const Named* begin() const { return counters_.data(); }
+    const Named* end() const { return counters_.data() + size_; }
+    const Named& operator[](std::size_t i) const { return counters_[i]; }
+
+   private:
+    std::array<Named, most> counters_{};
+    std::size_t size_ = 0;
+  };
+  NamedList named{};
   /// Adds n to a strategy's own counter, which starts at 0. Throws std::logic_error if a counter of the enum
-  /// has that name. O(named counters).
+  /// has that name, std::length_error if there are too many. O(named counters).
   void add(std::string_view own_name, std::uint64_t n);
 };
 
