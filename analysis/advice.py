@@ -97,13 +97,14 @@ class Advice:
     title: str
     baseline: bool
     speed: float  #: geometric mean, over the best refit
-    low: float  #: ends of the interval of the ratio in a single cell, or of its range over several
+    low: float  #: ends of the interval of the ratio in a single cell (the range of its rounds, if few), or of its range over several
     high: float
     cells: int  #: of the situation
     measured: int  #: of these, in which it was measured
     worst: str  #: the title of the cell with its lowest speed
     best_in: int  #: of a refit: cells in which it is the best refit
     disturbed: bool = False
+    is_interval: bool = False  #: in a single cell: of at least five rounds
 
     @property
     def says(self) -> str:
@@ -117,7 +118,9 @@ class Advice:
             worst = f"; at worst {text.factor(self.low)} times as fast as that one" if self.best_in < self.cells else ""
             return f"the best refit {where}{worst}{missing}"
         span = f"{text.factor(self.low)} to {text.factor(self.high)}" if self.low < self.high else ""
-        of = f"95\u00a0% interval {span}" if span and self.cells == 1 else f"{span} in {text.plural(self.cells, 'cell')}".lstrip()
+        of = f"{span} in {text.plural(self.cells, 'cell')}".lstrip()
+        if span and self.cells == 1:
+            of = ("95\u00a0% interval " if self.is_interval else "range of its rounds ") + span
         doubt = "; the machine was disturbed" if self.disturbed else ""
         return f"{text.factor(self.speed)} times as fast as the best refit ({of}{missing}{doubt})"
 
@@ -208,13 +211,14 @@ def advise(study: Study, own: Sequence[Cell], known: str) -> Optional[Advice]:
     worst = min(measured, key=lambda cell: cell.speeds[best])
     first = study.runs[study.runs["id"] == best].iloc[0]
     low, high = worst.speeds[best], max(cell.speeds[best] for cell in measured)
+    is_interval = False
     if len(own) == 1:
         found = ratios.ratio(study, own[0].runs[best], own[0].refit, "with_motion")
-        low, high = (found.low, found.high) if found else (low, high)
+        low, high, is_interval = (found.low, found.high, found.is_interval) if found else (low, high, False)
     disturbed = any(ratios.is_disturbed(study, cell.runs[best], cell.refit) for cell in measured)
     return Advice(
         best, str(first["title"]), bool(first["baseline"]), most, low, high, len(own), len(measured), worst.title,
-        sum(cell.refit == cell.runs[best] for cell in measured), disturbed,
+        sum(cell.refit == cell.runs[best] for cell in measured), disturbed, is_interval,
     )  # fmt: skip
 
 

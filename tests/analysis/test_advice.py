@@ -76,6 +76,18 @@ class TestRule(unittest.TestCase):
         self.assertEqual(best.id, "lazy")
         self.assertEqual(best.says, "the best refit in 1 of 3 cells; at worst 0.91 times as fast as that one")
 
+    def test_a_range_of_few_rounds_is_not_called_an_interval(self) -> None:
+        for rounds, word in ((5, "95\u00a0% interval"), (3, "range of its rounds")):
+            lines = [line("refit", 2.0), other("join", 1.0)]
+            for one in lines:
+                every = one["times"]["repetitions"] = one["times"]["repetitions"][:rounds]
+                for i, repetition in enumerate(every):
+                    repetition["update"] *= 1 + 0.1 * i * (one is lines[1])
+            with self.subTest(rounds):
+                (best,) = {one.id: one for one in taken(lines)}.values()
+                self.assertEqual(best.id, "join")
+                self.assertIn(f"({word} ", best.says)
+
     def test_cells_without_a_refit_count_nowhere(self) -> None:
         alone = [other("one", 1.0, "ball"), other("two", 2.0, "ball")]
         self.assertEqual(len(advice.cells(study([*alone, line("refit", 2.0), other("one", 1.0)]))), 1)

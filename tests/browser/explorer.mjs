@@ -289,6 +289,15 @@ await check("three questions are answered by a name, an interval and a curve", a
   await page.close();
 });
 
+await check("a range of few rounds is not called an interval", async () => {
+  const page = await open("reference", "#know=next&of=blender/dancer-skirt");
+  assert.match(await page.$eval(".answer", (one) => one.textContent), /^Take .* times as fast as the best refit \(range of its rounds [\d.]+ to [\d.]+\)/);
+  await page.close();
+  const merged = await open("merged", "#know=clip&large=small&frames=10&of=<b>%26\"scene\"");
+  assert.match(await merged.$eval(".answer", (one) => one.textContent), /\(95\u00a0% interval [\d.]+ to [\d.]+\)/);
+  await merged.close();
+});
+
 await check("six lines, and the others on demand", async () => {
   for (const view of ["answer", "overview", "scaling"]) {
     const page = await open("reference", `#view=${view}&know=clip`);

@@ -78,7 +78,7 @@ export function ranked(model, cells, known) {
   if (cells.length === 1)
     for (const one of found) {
       const ratio = compare(model, cells[0].runs.get(one.id), cells[0].refit, "with_motion");
-      if (ratio) Object.assign(one, { low: ratio.low, high: ratio.high });
+      if (ratio) Object.assign(one, { low: ratio.low, high: ratio.high, isInterval: ratio.isInterval });
     }
   for (const one of found) {
     one.bestIn = one.own.filter(({ refit, runs }) => runs.get(one.id) === refit).length;

@@ -99,7 +99,8 @@ export function speedText(one) {
     return `the best refit ${where}${one.bestIn < one.cells ? `; at worst ${factor(one.low)} times as fast as that one` : ""}${missing}`;
   }
   const span = one.low < one.high ? `${factor(one.low)} to ${factor(one.high)}` : "";
-  const of = span && one.cells === 1 ? `95\u00a0% interval ${span}` : `${span} in ${plural(one.cells, "cell")}`.trim();
+  const kind = one.isInterval ? "95\u00a0% interval" : "range of its rounds";
+  const of = span && one.cells === 1 ? `${kind} ${span}` : `${span} in ${plural(one.cells, "cell")}`.trim();
   return `${factor(one.speed)} times as fast as the best refit (${of}${missing}${one.disturbed ? "; the machine was disturbed" : ""})`;
 }
 
