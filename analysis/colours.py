@@ -69,6 +69,7 @@ class Look:
     marker: str
     line: object
     filled: bool
+    dark: str = ""  #: its colour on a dark page
 
     @property
     def face(self) -> str:
@@ -134,6 +135,7 @@ def looks(contestants: Iterable[tuple[str, str, str]]) -> dict[str, Look]:
             marker=marker,
             line=LINE_STYLES[(member + variant) % len(LINE_STYLES)],
             filled=(member + variant) % 2 == 0,
+            dark=shaded_on_dark(colour, SHADES[member % len(SHADES)]),
         )
     return result
 
@@ -169,9 +171,11 @@ def symbol(look: Look) -> str:
     return f'<svg class="symbol" viewBox="-6.5 -6.5 13 13" width="13" height="13" aria-hidden="true">{shape}</svg>'
 
 
-#: The dark page of the explorer, and the least contrast of a mark on it (WCAG 2.1, 1.4.11: 3 for graphics).
+#: The dark page of the explorer, the least contrast of a mark on it (WCAG 2.1, 1.4.11: 3 for graphics), and that of a family's colour,
+#: which leaves room for a member that is darker.
 DARK_PAGE = "#15181D"
 DARK_CONTRAST = 4.0
+DARK_FAMILY = 5.0
 
 
 def _luminance(colour: str) -> float:
@@ -187,10 +191,15 @@ def contrast(one: str, other: str) -> float:
     return (light + 0.05) / (dark + 0.05)
 
 
-def on_dark(colour: str) -> str:
+def on_dark(colour: str, least: float = DARK_CONTRAST) -> str:
     """Mixes a colour with as much white as it needs to be seen on the dark page."""
     shades = (mix(colour, share / 20) for share in range(21))
-    return next(shade for shade in shades if contrast(shade, DARK_PAGE) >= DARK_CONTRAST)
+    return next(shade for shade in shades if contrast(shade, DARK_PAGE) >= least)
+
+
+def shaded_on_dark(family: str, shade: float) -> str:
+    """Returns the colour of a family's member on the dark page: as far from that page as its shade is from the light one."""
+    return on_dark(mix(on_dark(family, DARK_FAMILY), -shade))
 
 
 def for_page(look: Look) -> dict[str, object]:
@@ -198,7 +207,7 @@ def for_page(look: Look) -> dict[str, object]:
     corners = [[float(c) for c in corner.split(",")] for corner in _POLYGONS.get(look.marker, "").split()]
     return {
         "light": look.colour,
-        "dark": on_dark(look.colour),
+        "dark": look.dark,
         "corners": corners,
         "dashes": [] if isinstance(look.line, str) else list(look.line[1]),  # type: ignore[index]
         "filled": look.filled,
@@ -215,4 +224,5 @@ def palette() -> dict[str, object]:
         "corners": {name: [[float(c) for c in corner.split(",")] for corner in text.split()] for name, text in _POLYGONS.items()},
         "dark": DARK_PAGE,
         "contrast": DARK_CONTRAST,
+        "family_contrast": DARK_FAMILY,
     }

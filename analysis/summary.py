@@ -114,8 +114,9 @@ def on_the_paper(found: Paper) -> str:
         says += f" The reference run judges {text.listing(differ)} otherwise."
     main = next((one for one in decided if one.row.id == MAIN), None)
     if main is not None:
-        measured = "; ".join(f"{name} {span} times" for name, span in main.corners[:3])
-        says += f" {main.row.claim} ({MAIN}) {main.verdict} ({main.source}){': ' if measured else ''}{measured}."
+        measured = "; ".join(f"{name}, {span}" for name, span in main.corners[:3])
+        says += f" {main.row.claim} ({MAIN}) {main.verdict} ({main.source})."
+        says += f" Times as fast: {measured}." if measured else ""
     return says
 
 

@@ -215,8 +215,8 @@ def _short(value: float) -> str:
 
 # ---- Drawing
 
-WIDTH, HEIGHT = 420, 330
-LEFT, RIGHT, TOP, BOTTOM = 48, 10, 26, 40
+WIDTH, HEIGHT = 420, 348
+LEFT, RIGHT, TOP, BOTTOM = 48, 10, 44, 40  #: names of the vertical lines stand above the top, where no mark is
 HEAD = 16  #: room for a label above the largest share
 STRIP = 20  #: height of the strip of exact zeros
 FONT = 6.4  #: width of a character, for labels that keep apart
@@ -273,14 +273,14 @@ def panel(place: Place, column: str, title: str, looks: dict[str, tuple[str, str
         x = scale.x(exact.time)
         made.append(f'<rect class="slower" x="{x:.1f}" y="{TOP}" width="{right - x:.1f}" height="{bottom - TOP}"/>')
     unknowing = next((one for one in place.points if one.exact and one.foresight == "none"), None)
-    lines = [(exact, "fastest exact", "beat", 9)] + [(unknowing, "no foresight", "beat unknowing", 22)] * (unknowing is not exact)
-    for one, name, kind, down in lines:
+    lines = [(exact, "fastest exact", "beat", 15)] + [(unknowing, "no foresight", "beat unknowing", 3)] * (unknowing is not exact)
+    for one, name, kind, up in lines:  # the line further right begins below the name of the other
         if one is None:
             continue
         x = scale.x(one.time)
         end = x + 4 + 0.95 * FONT * len(name) > right
-        made.append(f'<line class="{kind}" x1="{x:.1f}" x2="{x:.1f}" y1="{TOP}" y2="{bottom}"/>')
-        made.append(f'<text class="tick{" end" if end else ""}" x="{x + (-4 if end else 4):.1f}" y="{TOP + down}">{name}</text>')
+        made.append(f'<line class="{kind}" x1="{x:.1f}" x2="{x:.1f}" y1="{TOP - up - 8}" y2="{bottom}"/>')
+        made.append(f'<text class="tick{" end" if end else ""}" x="{x + (-4 if end else 4):.1f}" y="{TOP - up}">{name}</text>')
     front = place.fronts[column]
     if front:
         way = f"M{scale.x(front[0].time):.1f} {TOP}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import itertools
 import json
 import shutil
 import subprocess
@@ -219,6 +220,16 @@ class TestColours(unittest.TestCase):
                 own = colours.mix(colour, shade)
                 self.assertGreaterEqual(colours.contrast(colours.on_dark(own), colours.DARK_PAGE), colours.DARK_CONTRAST)
         self.assertAlmostEqual(colours.contrast("#000000", "#FFFFFF"), 21)
+
+    def test_members_of_a_family_differ_on_the_dark_page(self) -> None:
+        members = [f"member {i}" for i in range(len(colours.SHADES))]
+        for family in colours.FAMILIES:
+            found = colours.looks((name, name, family) for name in members)
+            dark = [str(colours.for_page(look)["dark"]) for look in found.values()]
+            for one, other in itertools.combinations(dark, 2):
+                self.assertGreaterEqual(colours.contrast(one, other), 1.15, f"{family}: {one} and {other}")
+            for one in dark:
+                self.assertGreaterEqual(colours.contrast(one, colours.DARK_PAGE), colours.DARK_CONTRAST)
 
 
 if __name__ == "__main__":

@@ -55,7 +55,7 @@ class TestPaper(unittest.TestCase):
         says = summary.on_the_paper(found)
         for words in ("Of its 4 claims 2 hold, 1 hold with a condition, 0 do not hold and 1 are open", "1 decided by this study and 2 by the "
                       "reference run that comes with the project (Some CPU, 2026-01-02, commit 01234567)", "judges E2 otherwise",
-                      "(E3) holds with a condition (the reference run): a against b 2 to 3 times"):  # fmt: skip
+                      "(E3) holds with a condition (the reference run). Times as fast: a against b, 2 to 3."):  # fmt: skip
             self.assertIn(words, says)
 
     def test_the_reference_run_does_not_stand_in_for_itself(self) -> None:

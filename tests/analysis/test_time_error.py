@@ -131,6 +131,22 @@ class TestTimeError(unittest.TestCase):
         self.assertEqual(re.findall('class="number"[^>]*>([^<]*)<', shown.panels[0]), ["1", "2", "3"])
         self.assertEqual(len(shown.all_rows), 4)
 
+    def test_no_line_and_no_mark_crosses_the_name_of_a_vertical_line(self) -> None:
+        lines = [exact("join", 1.5, foresight="next_keyframe"), exact("refit", 1.6), exact("slow", 9.0), wrong("a", 1.52, 1000), wrong("b", 1.55, 900)]
+        (shown,) = time_error.shown(self.study(lines))
+        for panel in shown.panels:
+            names = re.findall(r'<text class="tick" x="([\d.]+)" y="([\d.]+)">(fastest exact|no foresight)<', panel)
+            self.assertEqual(len(names), 2)
+            marks = re.findall(r'translate\(([\d.]+) ([\d.]+)', panel)
+            falls = re.findall(r'<line class="(?:beat|grid|lead)[^"]*" x1="([\d.]+)" x2="[\d.]+" y1="([\d.]+)"', panel)
+            falls += re.findall(r'class="front" d="M([\d.]+) ([\d.]+)', panel)
+            self.assertGreaterEqual(len(marks), 2)
+            self.assertGreaterEqual(len(falls), 3)
+            for x, y, name in names:
+                left, right, foot = float(x), float(x) + time_error.FONT * len(name), float(y)
+                for at, top in [*falls, *((x, str(float(y) - 4)) for x, y in marks)]:
+                    self.assertFalse(left < float(at) < right and float(top) < foot, f"{name}: {at}, {top}")
+
     def test_it_follows_the_answers_where_there_is_an_error(self) -> None:
         for lines, there in (([exact("refit", 2.0), wrong("a", 1.0, 5)], True), ([exact("refit", 2.0), exact("tree", 1.0)], False)):
             with tempfile.TemporaryDirectory(prefix="kbvh-analysis-") as name, contextlib.redirect_stdout(io.StringIO()):

@@ -13,7 +13,7 @@ function luminance(colour) {
   return 0.2126 * r + 0.7152 * g + 0.0722 * b;
 }
 
-function onDark(colour, { dark, contrast }) {
+function onDark(colour, dark, contrast) {
   const ground = luminance(dark) + 0.05;
   for (let share = 0; share <= 20; share += 1) {
     const shade = mix(colour, share / 20);
@@ -43,12 +43,12 @@ export function looks(rows, palette) {
       const [colour, marker] = of(row.family);
       const member = members.get(row.family).indexOf(row.strategy.id);
       const variant = variants.get(row.strategy.id).indexOf(row.contestant);
-      const light = mix(colour, palette.shades[member % palette.shades.length]);
+      const shade = palette.shades[member % palette.shades.length];
       return [
         row.contestant,
         {
-          light,
-          dark: onDark(light, palette),
+          light: mix(colour, shade),
+          dark: onDark(mix(onDark(colour, palette.dark, palette.family_contrast), -shade), palette.dark, palette.contrast),
           corners: palette.corners[marker] ?? [],
           dashes: palette.dashes[(member + variant) % palette.dashes.length],
           filled: (member + variant) % 2 === 0,
