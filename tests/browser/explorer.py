@@ -172,6 +172,7 @@ def merged(place: Path, program: str) -> dict[str, Any]:
     for row in both.itertuples():
         found = ratios.ratio(study, int(row.run_b), int(row.run_a), "with_motion")
         expected["versus"].append(described(found))
+    expected["one"] = {"results": str(place / "one" / "results.jsonl"), "scene": "<b>&\"scene\"", "runs": 54}
     expected["records"] = sum(1 for _ in (folder / "results.jsonl").open())
     return expected
 
