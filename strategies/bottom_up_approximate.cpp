@@ -17,12 +17,12 @@
 // and boxes of every 8th frame miss 0.3 % of the pairs. On passing spheres of 41k triangles boxes of every
 // 8th frame halve the time, positions included, and miss 79 % of the pairs (Intel Xeon, a busy machine).
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/contract/registry.hpp"
-#include "core/families/slabs/slab_query.hpp"
+#include "core/families/slabs/slab_strategy.hpp"
 #include "core/families/wide/kernels/reduce.hpp"
-#include "core/families/wide/stored_hierarchy.hpp"
 #include "core/geometry/triangle_batch.hpp"
 
 namespace kbvh {
@@ -31,21 +31,16 @@ namespace {
 /// The dials of boxes: `boxes`, `rounding`, `refit_every`, `margin`, `query`. A derived class may have other
 /// positions.
 template <class S, class Base>
-class ReducedBase : public Base {
+class ReducedBase : public SlabStrategy<S, Base> {
  public:
   ReducedBase(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
               const Params& params)
-      : Base(scene, motion, std::move(topologies), params),
+      : SlabStrategy<S, Base>(scene, motion, std::move(topologies), params),
         dropped_(dropped_digits(params.word("boxes"))),
         outward_(params.word("rounding") == "outward"),
         refit_every_(std::uint64_t(params.number("refit_every"))),
-        margin_(params.number("margin")),
-        blocks_(scene.body_count()),
-        slabs_(scene) {
-    for (std::uint32_t body = 0; body < scene.body_count(); ++body)
-      by_slabs_.push_back(
-          params.word("query") == "slabs" && SlabQuery<S>::accepts(scene.primitives(body)) &&
-          (this->hierarchies_[body].empty() || this->hierarchies_[body].padded_leaf_size() > 1));
+        margin_(params.number("margin")) {
+    if (params.word("query") != "slabs") std::fill(this->accepted_.begin(), this->accepted_.end(), 0);
   }
 
   void reset_to(double /*t*/) override {
@@ -70,32 +65,6 @@ class ReducedBase : public Base {
     }
   }
 
-  QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& budget) override {
-    QueryStatus status;
-    std::uint64_t tests = 0;
-    this->for_near_bodies(tests, [&](const BodyPair& pair) {
-      if (tests >= budget.box_tests)
-        ++status.pending;
-      else if (by_slabs_[pair.first] != 0 && by_slabs_[pair.second] != 0)
-        status.pending +=
-            slabs_.run(slab_side(pair.first), slab_side(pair.second), out, tests, rest_of(budget, tests))
-                .pending;
-      else
-        status.pending +=
-            this->query_.run(box_side(pair.first), box_side(pair.second), out, tests, rest_of(budget, tests))
-                .pending;
-    });
-    this->count_.add(Counter::box_tests, tests);
-    this->last_box_tests_ = tests;
-    return status;
-  }
-
-  std::size_t bytes() const override {
-    std::size_t total = Base::bytes() + slabs_.bytes();
-    for (const SlabBlocks<S>& blocks : blocks_) total += blocks.bytes();
-    return total;
-  }
-
  protected:
   /// Returns the binary digits that numbers of this kind have less than the scalar.
   static unsigned dropped_digits(const std::string& word) {
@@ -103,16 +72,15 @@ class ReducedBase : public Base {
     return unsigned(std::numeric_limits<S>::digits - std::min(digits, std::numeric_limits<S>::digits));
   }
   /// Returns all positions of a body that boxes are made of.
-  virtual const S* positions_of_boxes(std::uint32_t body) {
+  virtual const S* positions_of_boxes(std::uint32_t body) { return scene_positions(body); }
+  const S* scene_positions(std::uint32_t body) override {
     this->sampled_.fetch_all(body);
     return this->sampled_.positions(body);
   }
-  /// Returns the positions that queries read if they are not the scene's; else null.
-  virtual const S* own_positions(std::uint32_t /*body*/) const { return nullptr; }
   /// Called when a body may have moved.
   virtual void positions_changed(std::uint32_t body) {
     this->hierarchies_[body].positions_changed();
-    blocks_[body].positions_changed();
+    this->blocks_[body].positions_changed();
   }
 
   void update(std::uint32_t body) override {
@@ -157,18 +125,6 @@ class ReducedBase : public Base {
     }
     return edges > 0 ? sum / double(edges) : 0;
   }
-  WideSide<S> box_side(std::uint32_t body) { return {&this->hierarchies_[body], body, own_positions(body)}; }
-  typename SlabQuery<S>::Side slab_side(std::uint32_t body) {
-    const S* own = own_positions(body);
-    if (own == nullptr) this->sampled_.fetch_all(body);
-    return {&this->hierarchies_[body], body, &blocks_[body],
-            own != nullptr ? own : this->sampled_.positions(body)};
-  }
-  void counts_cleared() override { slabs_.clear_counts(); }
-  void add_counts(Counters& table) const override {
-    table.add("leaf_pairs", slabs_.leaf_pairs());
-    table.add("leaf_pairs_separated", slabs_.separated());
-  }
 
  protected:
   unsigned dropped_;
@@ -178,9 +134,6 @@ class ReducedBase : public Base {
   std::uint64_t refit_every_, frame_ = 0;
   double margin_;
   std::vector<S> margins_;  ///< [body], units of the scene
-  std::vector<std::uint8_t> by_slabs_;
-  std::vector<SlabBlocks<S>> blocks_;
-  SlabQuery<S> slabs_;
 };
 
 template <class S>
