@@ -88,7 +88,6 @@ std::vector<Job> jobs_of(const Plan& plan, std::vector<std::string>& notes) {
     const Study& study = plan.studies[s];
     std::vector<std::string> left_out;
     const auto contestants = expand(study.strategies, study.params, study.builder, left_out);
-    try_parameters(contestants);
     for (const std::string& text : left_out) note(text);
     for (std::size_t i = 0; i < study.scenes.size(); ++i) {
       const SceneSpec& spec = study.scenes[i];

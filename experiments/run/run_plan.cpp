@@ -442,7 +442,6 @@ StudyOutcome run_plan(const Plan& plan, const std::filesystem::path& out, const 
   std::vector<std::string> notes;
   for (const Study& study : plan.studies)
     contestants.push_back(expand(study.strategies, study.params, study.builder, notes));
-  for (const auto& list : contestants) try_parameters(list);
   check_target_contestants(plan, contestants);
   for (const std::string& text : std::set<std::string>(notes.begin(), notes.end())) say("note: " + text);
   Runner runner(plan, out, job);

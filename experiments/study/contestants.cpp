@@ -5,7 +5,6 @@
 #include <cmath>
 #include <set>
 
-#include "core/scene/self_pairs.hpp"
 #include "experiments/common/text.hpp"
 #include "experiments/io/bytes.hpp"
 
@@ -181,44 +180,6 @@ const StrategyEntry& strategy_named(const std::string& id) {
   std::vector<std::string> known;
   for (const StrategyEntry& entry : registry()) known.push_back(entry.info.id);
   throw ConfigError(no_such("strategy", id, known, "`kbvh list` shows them"));
-}
-
-namespace {
-
-/// Makes two bodies of one triangle each, one of which moves.
-template <class S>
-Scene<S> two_triangles() {
-  Scene<S> scene;
-  scene.name = "two triangles";
-  for (const S height : {S(0), S(1)}) {
-    Body<S> body;
-    body.primitives.add(std::vector<std::uint32_t>{0, 1, 2});
-    std::vector<S> positions;
-    for (const S step : {S(0), height})
-      positions.insert(positions.end(), {0, 0, height + step, 1, 0, height + step, 0, 1, height + step});
-    body.plans = FlightPlans<S>(3, {0.0, 1.0}, std::move(positions));
-    scene.bodies.push_back(std::move(body));
-  }
-  scene.pairs = all_pairs(scene.bodies);
-  return scene;
-}
-
-template <class S>
-void try_parameters_as(const ContestantSpec& spec) {
-  const Scene<S> scene = two_triangles<S>();
-  const Session<S> session(scene, spec.contestant());
-}
-
-}  // namespace
-
-void try_parameters(const std::vector<ContestantSpec>& list) {
-  for (const ContestantSpec& spec : list) {
-    if (spec.given.empty()) continue;
-    if (spec.entry->info.has_float)
-      try_parameters_as<float>(spec);
-    else
-      try_parameters_as<double>(spec);
-  }
 }
 
 std::vector<ContestantSpec> expand(const std::vector<StrategyRequest>& requests, const Sweep& common,

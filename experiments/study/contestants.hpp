@@ -46,10 +46,6 @@ const StrategyEntry* known_strategy(const std::string& id);
 /// Returns the entry of a strategy. Throws ConfigError with the nearest id if there is none.
 const StrategyEntry& strategy_named(const std::string& id);
 
-/// Creates each contestant with its own parameters once, on two triangles. Throws ConfigError for a value
-/// that only the strategy itself can refuse.
-void try_parameters(const std::vector<ContestantSpec>& list);
-
 /// Expands the requests, in order, each configuration once. `common` parameters are "key" (for every strategy
 /// that has it) or "strategy.key"; `builder` applies to every request without its own builder. Members of
 /// "all", "default" and "family:" that cannot take the builder are left out, with a sentence in `notes`;

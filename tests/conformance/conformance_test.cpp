@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <limits>
 #include <map>
 #include <set>
 
+#include "core/base/library_gaps.hpp"
 #include "core/kernels/kernel_set.hpp"
 #include "core/scene/self_pairs.hpp"
 #include "tests/conformance/check.hpp"
@@ -267,6 +269,36 @@ TEST(Registry, SelfPairsAreDeclaredOrRefused) {
     EXPECT_FALSE(share_vertex(primitives[pair.primitive_a], primitives[pair.primitive_b]));
   }
   EXPECT_GT(within, 20u);
+}
+
+/// Returns values of a parameter: all its words, or the ends of its range and numbers in between.
+std::vector<std::string> values_of(const Parameter& parameter) {
+  if (!parameter.allowed.empty()) return parameter.allowed;
+  const double most = std::min(parameter.most, std::numeric_limits<double>::max());
+  std::set<std::string> values{parameter.default_value, shortest_text(parameter.least), shortest_text(most)};
+  for (double value = 1; value <= std::min(most, 1e6); value *= 10)
+    if (value >= parameter.least) values.insert(shortest_text(value));
+  return {values.begin(), values.end()};
+}
+
+template <class S>
+void expect_all_values_are_taken() {
+  const TestScene<S> test = bending_grid<S>(4);
+  for (const StrategyEntry& entry : registry()) {
+    if (entry.factory<S>() == nullptr) continue;
+    for (const Parameter& parameter : entry.info.parameters)
+      for (const std::string& value : values_of(parameter))
+        EXPECT_NO_THROW(
+            Session<S>(test.scene, {&entry, {{parameter.name, value}}, entry.info.topology.preferred}))
+            << entry.info.id << ", " << parameter.name << " = " << value;
+  }
+}
+
+// The declaration alone decides which values a parameter has: a study whose parameters were accepted does not
+// stop at a strategy.
+TEST(Registry, EveryStrategyTakesTheValuesThatItDeclares) {
+  expect_all_values_are_taken<float>();
+  expect_all_values_are_taken<double>();
 }
 
 TEST(Registry, RejectsWhatItDoesNotKnow) {
