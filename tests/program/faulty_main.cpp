@@ -104,45 +104,15 @@ class EveryAnswer : public EveryPair<S, fault>, public AnswersRays<S>, public An
   }
 };
 
-template <class S>
-struct Honest : EveryAnswer<S, Fault::none> {
-  using EveryAnswer<S, Fault::none>::EveryAnswer;
+template <Fault fault>
+struct Pairs {
+  template <class S>
+  using With = EveryPair<S, fault>;
 };
-template <class S>
-struct LazyWhenTimed : EveryAnswer<S, Fault::lazy_when_timed> {
-  using EveryAnswer<S, Fault::lazy_when_timed>::EveryAnswer;
-};
-template <class S>
-struct LazyUnlessJudged : EveryPair<S, Fault::lazy_unless_judged> {
-  using EveryPair<S, Fault::lazy_unless_judged>::EveryPair;
-};
-template <class S>
-struct WorksInReset : EveryPair<S, Fault::works_in_reset> {
-  using EveryPair<S, Fault::works_in_reset>::EveryPair;
-};
-template <class S>
-struct WorksInFirstQuery : EveryPair<S, Fault::works_in_first_query> {
-  using EveryPair<S, Fault::works_in_first_query>::EveryPair;
-};
-template <class S>
-struct Loses : EveryPair<S, Fault::loses_a_pair> {
-  using EveryPair<S, Fault::loses_a_pair>::EveryPair;
-};
-template <class S>
-struct Repeats : EveryPair<S, Fault::repeats_a_pair> {
-  using EveryPair<S, Fault::repeats_a_pair>::EveryPair;
-};
-template <class S>
-struct NeedsMemory : EveryPair<S, Fault::needs_memory> {
-  using EveryPair<S, Fault::needs_memory>::EveryPair;
-};
-template <class S>
-struct Aborts : EveryPair<S, Fault::aborts> {
-  using EveryPair<S, Fault::aborts>::EveryPair;
-};
-template <class S>
-struct Throws : EveryPair<S, Fault::throws> {
-  using EveryPair<S, Fault::throws>::EveryPair;
+template <Fault fault>
+struct Answers {
+  template <class S>
+  using With = EveryAnswer<S, fault>;
 };
 
 Info info(const char* id, Guarantee guarantee) {
@@ -166,20 +136,20 @@ const std::vector<StrategyEntry>& registry() {
   Info near = info("only_near", Guarantee::exact);
   near.max_coordinate = 100;
   static const std::vector<StrategyEntry> entries{
-      make_entry<Honest>(info("honest", Guarantee::exact)),
-      make_entry<Loses>(info("loses", Guarantee::exact)),
-      make_entry<Loses>(info("admits_to_lose", Guarantee::approximate)),
-      make_entry<Repeats>(info("repeats", Guarantee::candidate_superset)),
-      make_entry<Throws>(info("throws", Guarantee::exact)),
-      make_entry<NeedsMemory>(info("needs_memory", Guarantee::exact)),
-      make_entry<Aborts>(info("aborts", Guarantee::exact)),
-      make_entry<LazyWhenTimed>(info("lazy_when_timed", Guarantee::exact)),
-      make_entry<LazyUnlessJudged>(info("lazy_unless_judged", Guarantee::exact)),
-      make_entry<WorksInReset>(info("works_in_reset", Guarantee::exact)),
-      make_entry<WorksInFirstQuery>(info("works_in_first_query", Guarantee::exact)),
-      make_entry<Honest>(small),
-      make_entry<Honest>(near),
-      make_entry<Honest, Scalars::double_only>(info("only_double", Guarantee::exact))};
+      make_entry<Answers<Fault::none>::With>(info("honest", Guarantee::exact)),
+      make_entry<Pairs<Fault::loses_a_pair>::With>(info("loses", Guarantee::exact)),
+      make_entry<Pairs<Fault::loses_a_pair>::With>(info("admits_to_lose", Guarantee::approximate)),
+      make_entry<Pairs<Fault::repeats_a_pair>::With>(info("repeats", Guarantee::candidate_superset)),
+      make_entry<Pairs<Fault::throws>::With>(info("throws", Guarantee::exact)),
+      make_entry<Pairs<Fault::needs_memory>::With>(info("needs_memory", Guarantee::exact)),
+      make_entry<Pairs<Fault::aborts>::With>(info("aborts", Guarantee::exact)),
+      make_entry<Answers<Fault::lazy_when_timed>::With>(info("lazy_when_timed", Guarantee::exact)),
+      make_entry<Pairs<Fault::lazy_unless_judged>::With>(info("lazy_unless_judged", Guarantee::exact)),
+      make_entry<Pairs<Fault::works_in_reset>::With>(info("works_in_reset", Guarantee::exact)),
+      make_entry<Pairs<Fault::works_in_first_query>::With>(info("works_in_first_query", Guarantee::exact)),
+      make_entry<Answers<Fault::none>::With>(small),
+      make_entry<Answers<Fault::none>::With>(near),
+      make_entry<Answers<Fault::none>::With, Scalars::double_only>(info("only_double", Guarantee::exact))};
   return entries;
 }
 std::string_view about(std::string_view /*id*/) {
