@@ -8,7 +8,7 @@
 
 #include "core/base/counters.hpp"
 #include "experiments/common/text.hpp"
-#include "experiments/results/record_times.hpp"
+#include "experiments/study/times_record.hpp"
 
 namespace kbvh::experiments {
 

@@ -7,6 +7,7 @@
 
 #include "experiments/study/measure.hpp"
 #include "experiments/study/plan.hpp"
+#include "experiments/study/times_record.hpp"
 
 namespace kbvh::experiments {
 

@@ -25,6 +25,7 @@
 #include "experiments/study/contact_measurement.hpp"
 #include "experiments/study/ray_measurement.hpp"
 #include "experiments/study/targets.hpp"
+#include "experiments/study/times_record.hpp"
 
 namespace kbvh::experiments {
 

@@ -161,11 +161,6 @@ class Measurement : public Entrants<Entrant<S>> {
 extern template class Measurement<float>;
 extern template class Measurement<double>;
 
-/// Returns the raw times of a contestant that was timed; `session` names the rounds.
-RawTimes raw_times(const Measured& measured, const std::string& session);
-/// Makes the times of a result record: raw times in ms, and the spread over the frames of the median
-/// repetition.
-nlohmann::json times_record(const Measured& measured);
 /// Makes the verification of a result record.
 nlohmann::json verified_record(const Measured& measured);
 nlohmann::json counters_record(const Counters& counters);

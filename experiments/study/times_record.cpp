@@ -1,3 +1,5 @@
+#include "experiments/study/times_record.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -43,6 +45,13 @@ json phases_record(const PhaseTimes& sum, std::size_t frames) {
           {"triangle_tests", mean(sum.triangle_tests)},
           {"plan_changes", mean(sum.plan_changes)},
           {"geometry_changes", mean(sum.geometry_changes)}};
+}
+
+/// Reads means per frame as sums over frames.
+PhaseTimes phases_of(const json& means, std::size_t frames) {
+  const auto sum = [&](const char* name) { return means.value(name, 0.0) * double(frames); };
+  return {sum("motion"),         sum("update"),       sum("traversal"),
+          sum("triangle_tests"), sum("plan_changes"), sum("geometry_changes")};
 }
 
 /// Returns the smallest of the sorted values that at least this share of them does not exceed.
@@ -101,6 +110,30 @@ RawTimes raw_times(const Measured& measured, const std::string& session) {
     if (measured.steady_from) times.steady.push_back(in_ms(clip.sum(*measured.steady_from)));
   }
   return times;
+}
+
+RawTimes raw_times(const json& record) {
+  const json& times = record.at("times");
+  RawTimes raw;
+  raw.session = record.value("run", std::string());
+  bool of_frames = true;
+  for (const json& one : times.at("repetitions")) of_frames = of_frames && one.contains("totals");
+  raw.by = of_frames && times.value("by", "frames") == "frames" ? By::frames : By::clips;
+  if (of_frames && times.contains("steady_from") && times.at("steady_from").is_number_unsigned())
+    raw.steady_from = times.at("steady_from").get<std::size_t>();
+  for (const json& one : times.at("repetitions")) {
+    if (of_frames) {
+      raw.totals.push_back(one.at("totals").get<std::vector<double>>());
+      raw.motions.push_back(one.at("motions").get<std::vector<double>>());
+    } else {
+      const PhaseTimes mean = phases_of(one, 1);
+      raw.totals.push_back({mean.total()});
+      raw.motions.push_back({mean.motion});
+    }
+    raw.clip.push_back(phases_of(one, raw.frames()));
+    if (raw.steady_from) raw.steady.push_back(phases_of(one.at("steady"), raw.frames() - *raw.steady_from));
+  }
+  return raw;
 }
 
 json times_record(const Measured& measured) {

@@ -12,6 +12,7 @@
 #include "experiments/results/table.hpp"
 #include "experiments/run/rounds.hpp"
 #include "experiments/study/measure.hpp"
+#include "experiments/study/times_record.hpp"
 #include "temporary_folder.hpp"
 
 namespace kbvh::experiments::results_test {

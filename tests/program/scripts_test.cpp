@@ -10,6 +10,7 @@
 #include "experiments/scenes/scripted.hpp"
 #include "experiments/study/measure.hpp"
 #include "experiments/study/plan.hpp"
+#include "experiments/study/times_record.hpp"
 #include "temporary_folder.hpp"
 
 namespace kbvh::experiments::scripts_test {
