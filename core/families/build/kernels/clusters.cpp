@@ -49,6 +49,7 @@ using P = Points<float, 1>;
 using Pack = P::Pack;
 
 /// The bins of a box on the three axes.
+#if defined(KBVH_KERNELS_portable)
 [[gnu::always_inline]] inline void bins_of(PlainPoint<float> lower, PlainPoint<float> upper,
                                            const BinsJob& job, std::int32_t (&bin)[4]) {
   constexpr float last = float(sah_bins - 1);
@@ -57,7 +58,7 @@ using Pack = P::Pack;
     bin[axis] = std::int32_t(smaller(larger(place, 0.0F), last));
   }
 }
-#if !defined(KBVH_KERNELS_portable)
+#else
 [[gnu::always_inline]] inline void bins_of(Vector<float, 4> lower, Vector<float, 4> upper, const BinsJob& job,
                                            std::int32_t (&bin)[4]) {
   using V = Vector<float, 4>;
