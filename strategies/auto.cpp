@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/contract/registry.hpp"
 #include "core/contract/tells_work.hpp"
@@ -104,7 +105,7 @@ class Auto final : public Strategy<S>,
     searched_ = {};
     saved_ = 0;
     weighed_at_ = 0;
-    tried_ = waits_ = refits_first_ = false;
+    tried_ = waits_ = refits_first_ = joins_first_ = false;
     join_.start_over(seen_);
     slabs_.start_over(runners_[0].candidate->cost == &refit_cost, seen_);
   }
@@ -132,17 +133,14 @@ class Auto final : public Strategy<S>,
     }
     tried_ = active_ != last &&
              ((rebuilds() && !rebuilds(last)) || is_active(&plain_cost) || join_.outdated() || refits_first_);
+    joins_first_ = active_ != last && is_active(&join_cost);
     Runner& runner = runners_[active_];
     if (runner.all_positions) fetch_all();
     if (active_ == last || runner.fresh) {
       if (window_.begins) begin_window();
       runner.strategy->advance(t);
     } else {
-      add(retired_, runner.strategy->counters());
-      fetch_all();
-      runner.strategy->reset(t);
-      // The instance sees the current plans, but not which bodies no longer rest.
-      if (!changed_.empty()) runner.strategy->flight_plans_changed(t, changed_);
+      restart(runner, t);
       if (window_.begins) begin_window();
     }
     for (Runner& other : runners_) other.fresh = false;
@@ -151,6 +149,7 @@ class Auto final : public Strategy<S>,
 
   QueryStatus find_candidates(double t, PairBuffer& out, const Budget& /*budget*/) override {
     const std::size_t before = out.size();
+    give_up_endless_join(t);
     // Not all candidates honour a budget.
     const QueryStatus status = runners_[active_].strategy->candidates_at(t, out, {});
     see_candidates(out.size() - before, true);
@@ -168,6 +167,7 @@ class Auto final : public Strategy<S>,
   }
 
   void find_changes(double t, Answer answer, PairBuffer& begun, PairBuffer& ended) override {
+    give_up_endless_join(t);
     changes_of_many_.find(*runners_[active_].strategy, t, answer, begun, ended);
     const PairSet& pairs = changes_of_many_.pairs(answer);
     // Pairs that intersect stand for the candidates among which they are.
@@ -248,6 +248,8 @@ class Auto final : public Strategy<S>,
   /// The number of frames after which the choice is reviewed within one segment, and at the start of a new
   /// one; the latter doubles each time that the choice is confirmed.
   static constexpr int longest_stay = 64, shortest_stay = 8;
+  /// A join's first segment may take so many times the work of a refit in its frames.
+  static constexpr double join_trial = 8;
   static constexpr double forgets = 0.9;  ///< exponent of what was measured of others, at each choice
 
   static void add(Counters& sum, const Counters& other) {
@@ -349,6 +351,31 @@ class Auto final : public Strategy<S>,
     saved_ += saves * (frame_ - weighed_at_);
     weighed_at_ = frame_;
     return saved_ + saves * shortest_stay > costs::Choice::start_primitive * seen_.primitives;
+  }
+  /// Starts an instance at a time within the clip. It sees the current plans, but not which bodies no longer
+  /// rest.
+  void restart(Runner& runner, double t) {
+    add(retired_, runner.strategy->counters());
+    fetch_all();
+    runner.strategy->reset(t);
+    if (!changed_.empty()) runner.strategy->flight_plans_changed(t, changed_);
+  }
+  /// Lets a refit answer this frame where the first join after a change of strategy would take many times the
+  /// work of a refit in all frames of the segment.
+  void give_up_endless_join(double t) {
+    if (!std::exchange(joins_first_, false) || runners_[active_].work == nullptr) return;
+    const double frame = std::max(refit_cost(seen_), costs::Work::slabs.read * seen_.reads);
+    const double most =
+        join_trial * frame * std::max(1.0, seen_.frames_per_segment) / costs::Work::join_box_test;
+    if (runners_[active_].work->searches_within(std::uint64_t(std::min(most, 1e15)) + 1)) return;
+    join_.given_up(seen_);
+    --runners_[active_].frames;
+    active_ = 0;
+    ++runners_[active_].frames;
+    restart(runners_[active_], t);
+    changes_of_many_.switched();
+    window_ = {};
+    stay_ = shortest_stay;
   }
   /// Strategies differ in the pairs that they leave out early: only drift_boxes reports all pairs of boxes,
   /// and shows that bodies are apart.
@@ -507,6 +534,7 @@ class Auto final : public Strategy<S>,
   int weighed_at_ = 0;  ///< the frame until which
   bool tried_ = false;  ///< a strategy answers for the first time whose work decides whether it stays
   ObservedAgeing ageing_;
+  bool joins_first_ = false;   ///< the join answers for the first time since another strategy did
   bool waits_ = false;         ///< for the next segment, to join it
   bool refits_first_ = false;  ///< before new trees are tried
   ObservedJoin join_;

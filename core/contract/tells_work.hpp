@@ -9,6 +9,10 @@ class TellsWork {
   virtual ~TellsWork() = default;
   /// Returns the box tests of the last search for pairs.
   virtual std::uint64_t last_box_tests() const = 0;
+  /// Makes the search of this frame ahead of its query, if it serves several frames and takes no more than so
+  /// many box tests; returns whether the query costs no more than these. A search that takes more is
+  /// abandoned at that number, which is counted, and the query will make all of it.
+  virtual bool searches_within(std::uint64_t /*box_tests*/) { return true; }
   /// Returns the surfaces of all boxes of moving bodies, each over that of its root: what grows as trees age.
   /// 0 if the trees do not age. O(nodes).
   virtual double surface() { return 0; }

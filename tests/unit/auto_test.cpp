@@ -52,6 +52,33 @@ TEST(Auto, DoesNotJoinWithOneFrameForASegment) {
   EXPECT_EQ(choice.find("interval_join"), std::string::npos) << choice;
 }
 
+// Two sheets of unit size and 0.1 apart, where numbers are 0.06 apart: boxes linear in time overlap nearly all
+// others, and a whole join would list millions of pairs.
+TEST(Auto, GivesUpAJoinWithoutEnd) {
+  constexpr std::uint32_t side = 32;
+  Scene<float> scene;
+  for (int b = 0; b < 2; ++b)
+    scene.bodies.push_back(
+        placed_grid<float>(side, 3, [&](std::uint32_t k, std::uint32_t i, std::uint32_t j, int axis) {
+          const double at = axis == 2 ? 0.2 * b : (axis == 0 ? i : j) / double(side) + 0.1 * b * k;
+          return 1e6 + at;
+        }));
+  scene.pairs = all_pairs(scene.bodies);
+  constexpr int frames = 80;
+  Play<float> play(scene, "auto", {}), refit(scene, "bottom_up", {});
+  for (int f = 1; f <= frames; ++f)
+    for (Play<float>* one : {&play, &refit}) one->frame(2.0 * f / frames);
+  const std::uint64_t tests = play.session.strategy().counters()[Counter::box_tests],
+                      of_refit = refit.session.strategy().counters()[Counter::box_tests],
+                      leaves = 2 * (2 * side * side / 16);
+  const std::string choice = play.session.strategy().choice();
+  EXPECT_LE(tests, 20 * (of_refit + frames * leaves)) << choice << ", refit: " << of_refit;
+  EXPECT_LE(play.session.strategy().bytes(), 16U << 20) << choice;
+  Play<float> join(scene, "interval_join", {});
+  join.frame(2.0 / frames);
+  EXPECT_GT(join.session.strategy().counters()[Counter::box_tests], tests) << "the scene is too easy";
+}
+
 TEST(Auto, DoesNotJoinWherePlansChangeAtEveryFrame) {
   const Scene<double> scene = grids<double>(20, 0.3, slow);
   std::uint32_t vertex = 0;

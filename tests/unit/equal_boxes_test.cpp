@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 
@@ -166,6 +167,31 @@ std::uint64_t steps_of_clip(const StrategyEntry& entry, const std::map<std::stri
 constexpr double most_growth = 6.5;
 constexpr std::uint32_t few = 1000, many = 4 * few;
 
+/// What a strategy's description says to be quadratic, and which cases these are.
+struct Excuse {
+  const char* id;
+  std::vector<std::string> cases;
+};
+const std::vector<Excuse>& excuses() {
+  static const std::vector<Excuse> list{
+      // each lower end of a box passes each upper end
+      {"kinetic_sweep", {"grows from a point", "shrinks to a point and returns"}},
+      // no node owns a side, and a search for one reads them all
+      {"kinetic_boxtree", {"equal", "points", "one face listed many times"}},
+  };
+  return list;
+}
+bool is_excused(const std::string& id, const std::string& input) {
+  return std::any_of(excuses().begin(), excuses().end(), [&](const Excuse& excuse) {
+    return excuse.id == id && std::count(excuse.cases.begin(), excuse.cases.end(), input) != 0;
+  });
+}
+
+TEST(EqualBoxes, ExcusesAreDescribed) {
+  for (const Excuse& excuse : excuses())
+    EXPECT_NE(about(excuse.id).find("quadratic"), std::string_view::npos) << excuse.id;
+}
+
 TEST(EqualBoxes, EveryUpdateIsNearlyLinear) {
   struct Variant {
     const char* id;
@@ -183,8 +209,7 @@ TEST(EqualBoxes, EveryUpdateIsNearlyLinear) {
                          large = with_other(input.body(many), other);
       for (const Variant& variant : variants) {
         const StrategyEntry& entry = find_strategy(variant.id);
-        // Its description says when and why.
-        if (about(entry.info.id).find("quadratic") != std::string_view::npos) {
+        if (is_excused(entry.info.id, input.name)) {
           ++excused;
           continue;
         }
@@ -198,7 +223,7 @@ TEST(EqualBoxes, EveryUpdateIsNearlyLinear) {
       }
     }
   EXPECT_GT(compared, 500u);
-  EXPECT_LE(excused, 2 * 2 * cases().size());  // two strategies
+  EXPECT_EQ(excused, 2 * (2 + 3));
 }
 
 /// Returns the sum over all inner nodes of the primitives below: what a builder reads that splits from the

@@ -52,6 +52,18 @@ class ObservedJoin {
     late_ = frame - frame_ > patience_ * std::max(1.0, refit_cost(seen) / join_cost(seen));
     outdated_ = outdated_ || late_;
   }
+  /// Registers that a join was given up before it was whole: it took as many times a refit's work of the same
+  /// frames as a trial may.
+  void given_up(Observed& seen) {
+    double& factor = seen.near ? seen.join_factor : seen.apart_factor;
+    factor = 1;
+    const double predicted = join_cost(seen);
+    factor = std::max(most, predicted > 0 ? dearer * refit_cost(seen) / predicted : most);
+    kept_ = std::sqrt(kept_);
+    known_ = known_ || seen.near;
+    outdated_ = late_ = false;
+    compared_ = 0;
+  }
   /// Prepares a choice while another strategy answers.
   void forget(Observed& seen) const {
     if (known_) seen.join_factor = std::pow(seen.join_factor, kept_);
