@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "core/contract/registry.hpp"
-#include "core/contract/tells_work.hpp"
+#include "core/contract/reports_work.hpp"
 #include "core/families/choice/changes_of_many.hpp"
 #include "core/families/choice/observed_ageing.hpp"
 #include "core/families/choice/observed_join.hpp"
@@ -67,7 +67,7 @@ class Auto final : public Strategy<S>,
       runners_.push_back({&candidate, found->info.positions == PositionUse::all,
                           NestedStrategies<S>::create(*found, scene, motion, topologies, own)});
       Runner& runner = runners_.back();
-      runner.work = dynamic_cast<TellsWork*>(runner.strategy.get());
+      runner.work = dynamic_cast<ReportsWork*>(runner.strategy.get());
     }
     if (runners_.empty()) throw ConfigError("auto has nothing to choose from");
   }
@@ -104,7 +104,7 @@ class Auto final : public Strategy<S>,
     chosen_tests_ = 0;
     searched_ = {};
     saved_ = 0;
-    weighed_at_ = 0;
+    savings_counted_until_ = 0;
     tried_ = waits_ = refits_first_ = joins_first_ = false;
     join_.start_over(seen_);
     slabs_.start_over(runners_[0].candidate->cost == &refit_cost, seen_);
@@ -129,7 +129,7 @@ class Auto final : public Strategy<S>,
     if (active_ != last) {
       changes_of_many_.switched();
       saved_ = 0;
-      weighed_at_ = frame_;
+      savings_counted_until_ = frame_;
     }
     tried_ = active_ != last &&
              ((rebuilds() && !rebuilds(last)) || is_active(&plain_cost) || join_.outdated() || refits_first_);
@@ -240,10 +240,10 @@ class Auto final : public Strategy<S>,
     const Candidate* candidate;
     bool all_positions;
     std::unique_ptr<Strategy<S>> strategy;
-    TellsWork* work = nullptr;  ///< the strategy, if it does
-    double factor = 1;          ///< cost over prediction, where it was found to cost more than a refit
-    bool fresh = false;         ///< in the state after `reset`
-    int frames = 0;             ///< number of frames that it answered
+    ReportsWork* work = nullptr;  ///< the strategy, if it does
+    double factor = 1;            ///< cost over prediction, where it was found to cost more than a refit
+    bool fresh = false;           ///< in the state after `reset`
+    int frames = 0;               ///< number of frames that it answered
   };
   /// The number of frames after which the choice is reviewed within one segment, and at the start of a new
   /// one; the latter doubles each time that the choice is confirmed.
@@ -307,7 +307,7 @@ class Auto final : public Strategy<S>,
   /// join that of the box tests of its segment.
   double searched() const {
     using Work = costs::Work;
-    const TellsWork* work = runners_[active_].work;
+    const ReportsWork* work = runners_[active_].work;
     if (is_active(&join_cost))
       return work == nullptr
                  ? 0
@@ -348,8 +348,8 @@ class Auto final : public Strategy<S>,
     double now = cost_of(active_);
     if (!std::isfinite(now)) now = cost_of(least([&](std::size_t runner) { return !rebuilds(runner); }));
     const double saves = std::max(0.0, now - cost_of(best));
-    saved_ += saves * (frame_ - weighed_at_);
-    weighed_at_ = frame_;
+    saved_ += saves * (frame_ - savings_counted_until_);
+    savings_counted_until_ = frame_;
     return saved_ + saves * shortest_stay > costs::Choice::start_primitive * seen_.primitives;
   }
   /// Starts an instance at a time within the clip. It sees the current plans, but not which bodies no longer
@@ -381,7 +381,7 @@ class Auto final : public Strategy<S>,
   /// and shows that bodies are apart.
   void see_candidates(std::size_t count, bool all) {
     pairs_asked_ = pairs_in_frame_ = true;
-    const TellsWork* work = runners_[active_].work;
+    const ReportsWork* work = runners_[active_].work;
     searched_.tests += work != nullptr ? double(work->last_box_tests()) : 0;
     searched_.candidates += double(count);
     if (count != 0 || is_active(&drift_cost)) seen_.near = count != 0;
@@ -424,7 +424,7 @@ class Auto final : public Strategy<S>,
   double joined_work() const {
     using Work = costs::Work;
     const double frames = frame_ - window_.frame;
-    const TellsWork* work = runners_[active_].work;
+    const ReportsWork* work = runners_[active_].work;
     const double boxes = work != nullptr ? double(work->last_box_tests()) : 0;
     const double in_frames = Work::span_test * double(span_tests() - window_.span_tests) +
                              Work::join_triangle_test * double(frame_tests() - window_.frame_tests) +
@@ -434,11 +434,11 @@ class Auto final : public Strategy<S>,
   }
   void begin_window() { window_ = {false, frame_, span_tests(), frame_tests(), this->sampled_.fetched()}; }
   std::uint64_t span_tests() const {
-    const TellsWork* work = runners_[active_].work;
+    const ReportsWork* work = runners_[active_].work;
     return work != nullptr ? work->span_tests() : 0;
   }
   std::uint64_t frame_tests() const {
-    const TellsWork* work = runners_[active_].work;
+    const ReportsWork* work = runners_[active_].work;
     return work != nullptr ? work->frame_tests() : 0;
   }
 
@@ -529,9 +529,9 @@ class Auto final : public Strategy<S>,
   double chosen_tests_ = 0;            ///< box tests of the refitted trees in the frame before
   struct Searched {
     double tests = 0, candidates = 0;
-  } searched_;          ///< since the last choice
-  double saved_ = 0;    ///< nanoseconds, see worth_a_start
-  int weighed_at_ = 0;  ///< the frame until which
+  } searched_;                     ///< since the last choice
+  double saved_ = 0;               ///< nanoseconds, see worth_a_start
+  int savings_counted_until_ = 0;  ///< the frame
   bool tried_ = false;  ///< a strategy answers for the first time whose work decides whether it stays
   ObservedAgeing ageing_;
   bool joins_first_ = false;   ///< the join answers for the first time since another strategy did

@@ -15,7 +15,7 @@
 #include <numeric>
 
 #include "core/contract/registry.hpp"
-#include "core/contract/tells_work.hpp"
+#include "core/contract/reports_work.hpp"
 #include "core/families/drift/drift_body.hpp"
 #include "core/families/drift/drift_model.hpp"
 #include "core/families/drift/drift_rays.hpp"
@@ -31,7 +31,7 @@ template <class S, class Motion>
 class DriftStrategy : public CountedStrategy<S>,
                       public AnswersRays<S>,
                       public TakesPlanChanges<S>,
-                      public TellsWork {
+                      public ReportsWork {
   using Body = DriftBody<S>;
   using Watch = typename Body::Watch;
   static constexpr bool bounded = std::is_same_v<Motion, SteppedMotion<S>>;

@@ -13,9 +13,9 @@
 // is twice as fast.
 //
 // Boxes linear in time are a few roundings of their coordinates larger than those of a refit. Where gaps and
-// triangles are no larger than these roundings, it lists far more pairs than a refit finds: nearly all of them
-// where two sheets of unit size lie 0.1 apart at 1e6 in float, whose numbers are 0.06 apart there. `auto` gives
-// up such a join.
+// triangles are no larger than these roundings, it lists far more pairs than a refit finds: nearly all of
+// them where two sheets of unit size lie 0.1 apart at 1e6 in float, whose numbers are 0.06 apart there.
+// `auto` gives up such a join.
 
 #include <algorithm>
 #include <limits>
@@ -23,7 +23,7 @@
 #include "core/base/cost_constants.hpp"
 #include "core/base/pacer.hpp"
 #include "core/contract/registry.hpp"
-#include "core/contract/tells_work.hpp"
+#include "core/contract/reports_work.hpp"
 #include "core/families/linear/interval_join.hpp"
 #include "core/families/linear/join_changes.hpp"
 #include "core/families/linear/linear_bounds.hpp"
@@ -70,7 +70,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S>,
                                    public AnswersSweeps<S>,
                                    public AnswersRays<S>,
                                    public TakesPlanChanges<S>,
-                                   public TellsWork {
+                                   public ReportsWork {
   static constexpr bool works_ahead = F == Foresight::whole_clip;
   using Motion = MotionView<F, S>;
 

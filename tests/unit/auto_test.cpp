@@ -52,8 +52,8 @@ TEST(Auto, DoesNotJoinWithOneFrameForASegment) {
   EXPECT_EQ(choice.find("interval_join"), std::string::npos) << choice;
 }
 
-// Two sheets of unit size and 0.1 apart, where numbers are 0.06 apart: boxes linear in time overlap nearly all
-// others, and a whole join would list millions of pairs.
+// Two sheets of unit size and 0.1 apart, where numbers are 0.06 apart: boxes linear in time overlap nearly
+// all others, and a whole join would list millions of pairs.
 TEST(Auto, GivesUpAJoinWithoutEnd) {
   constexpr std::uint32_t side = 32;
   Scene<float> scene;
@@ -169,7 +169,7 @@ TEST(Auto, LeavesSlabsThatDoNotPay) {
 }
 
 /// A search with some box tests.
-struct Told final : TellsWork {
+struct Told final : ReportsWork {
   explicit Told(std::uint64_t box_tests) : tests(box_tests) {}
   std::uint64_t last_box_tests() const override { return tests; }
   std::uint64_t tests;

@@ -1,7 +1,7 @@
 #pragma once
 #include <optional>
 
-#include "core/contract/tells_work.hpp"
+#include "core/contract/reports_work.hpp"
 #include "core/families/build/built_each_frame.hpp"
 #include "core/families/build/built_tree.hpp"
 #include "core/families/build/curve_order.hpp"
@@ -17,7 +17,7 @@ namespace kbvh {
 /// and may have searched(): the clusters searched by all builds, which are then counted. Of the given
 /// topologies, only the leaf size counts.
 template <class S, class Builder>
-class BuiltStrategy : public BuiltEachFrame<S, BuiltTree<S>>, public AnswersRays<S>, public TellsWork {
+class BuiltStrategy : public BuiltEachFrame<S, BuiltTree<S>>, public AnswersRays<S>, public ReportsWork {
   using Base = BuiltEachFrame<S, BuiltTree<S>>;
 
  protected:

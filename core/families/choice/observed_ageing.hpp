@@ -12,7 +12,7 @@ namespace kbvh {
 /// have returned to their first shape.
 class ObservedAgeing {
  public:
-  /// `surface`: of the refitted trees, see TellsWork.
+  /// `surface`: of the refitted trees, see ReportsWork.
   void start_over(double surface) {
     *this = {};
     new_surface_ = surface;
@@ -34,7 +34,7 @@ class ObservedAgeing {
       factor_ = std::max(1.0, tests_ / tests * (candidates + quiet) / (found_ + quiet));
       if (factor_ > 1.5) kept_ = std::sqrt(kept_);
       compared_ = true;
-      felt_ = possible() > 0 ? (factor_ - 1) * tests / possible() : 1;
+      realised_share_ = possible() > 0 ? (factor_ - 1) * tests / possible() : 1;
       seen.ageing = seen.sorted_ageing = (factor_ - 1) * tests / frame;
       if (seen.candidates > 0) seen.boxed = std::max(1.0, candidates / seen.candidates);
     }
@@ -48,12 +48,12 @@ class ObservedAgeing {
   void look_at_refitted(double surface, int frame, Observed& seen) {
     known_ = false;
     growth_ = new_surface_ > 0 ? std::max(1.0, surface / new_surface_) : 1;
-    const double surplus = felt_ * possible();
+    const double surplus = realised_share_ * possible();
     seen.aged = tests_ > 0 ? std::min(0.99, surplus / tests_) : 0;
     seen.ageing = seen.sorted_ageing = surplus / std::max(1, frame);
   }
-  /// The same while the rebuilt ones do. `growth`: of their surplus, see TellsWork. `sorted`: they are those
-  /// of drift_rebuild, which last longer and whose surplus grows the faster for it.
+  /// The same while the rebuilt ones do. `growth`: of their surplus, see ReportsWork. `sorted`: they are
+  /// those of drift_rebuild, which last longer and whose surplus grows the faster for it.
   void look_at_rebuilt(double growth, bool sorted, Observed& seen) {
     factor_ = 1 + kept_ * (factor_ - 1);
     if (!sorted) {
@@ -84,10 +84,10 @@ class ObservedAgeing {
   int frame_ = 0;        // in which they answered it
   double kept_ = 0.8;    // of the factor at a further choice; closer to 1 with each trial that new trees won
   double estimate_ = 0;  // of the tests of the refitted trees in this frame
-  double felt_ = 1;      // share of the possible saving that rebuilt trees have saved
-  double factor_ = 1;    // tests of refitted over those of rebuilt trees
-  double longer_ = 2.5;  // growth of drift_rebuild's surplus over that of lbvh_drift
-  double built_growth_ = 0;  // of lbvh_drift's, not yet compared with the other
+  double realised_share_ = 1;  // share of the possible saving that rebuilt trees have saved
+  double factor_ = 1;          // tests of refitted over those of rebuilt trees
+  double longer_ = 2.5;        // growth of drift_rebuild's surplus over that of lbvh_drift
+  double built_growth_ = 0;    // of lbvh_drift's, not yet compared with the other
   bool compared_ = false;
   bool known_ = false;  // the factor was measured since the refitted trees answered last
 };

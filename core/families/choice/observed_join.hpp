@@ -23,7 +23,7 @@ class ObservedJoin {
   /// Registers that a strategy that refits has answered the frame before `frame`; its work is in `seen`.
   void refitted(int frame, Observed& seen) {
     frame_ = frame;
-    met_ = seen.near;
+    bodies_were_near_at_refit_ = seen.near;
     if (outdated_) compare(seen);
     if (late_) patience_ *= 2;
     outdated_ = late_ = false;
@@ -40,7 +40,7 @@ class ObservedJoin {
     }
     work_ = work;
     candidates_ = candidates;
-    if (!met_)
+    if (!bodies_were_near_at_refit_)
       outdated_ = true;
     else if (compared_ == 0)
       compare(seen);
@@ -103,7 +103,7 @@ class ObservedJoin {
   double compared_ = 0;   // when it was compared; 0: a refit has answered since
   int frame_ = 0;         // the last one that a refit has answered
   double patience_ = 32;  // frames until a refit must answer again, as long as the join is as slow
-  bool met_ = false;      // bodies did when a refit answered
+  bool bodies_were_near_at_refit_ = false;  // bodies did when a refit answered
   bool known_ = false, outdated_ = false;
   bool late_ = false;  // outdated by the number of frames
 };

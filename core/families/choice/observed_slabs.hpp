@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "core/contract/tells_work.hpp"
+#include "core/contract/reports_work.hpp"
 #include "core/families/choice/predicted_costs.hpp"
 
 namespace kbvh {
@@ -22,7 +22,7 @@ class ObservedSlabs {
   }
   /// Registers a frame of leaf_slabs. `all`: the count is of all candidates, not only of pairs that
   /// intersect.
-  void slabs(double candidates, const TellsWork& work, bool all, int frame, Observed& seen) {
+  void slabs(double candidates, const ReportsWork& work, bool all, int frame, Observed& seen) {
     frame_ = all ? frame : never;
     seen.candidates = candidates;
     const double tests = double(work.last_box_tests());
@@ -31,7 +31,7 @@ class ObservedSlabs {
   }
   /// Registers a frame of bottom_up: the first after one of leaf_slabs is a comparison, and others scale what
   /// was known of leaf_slabs by their box tests.
-  void plain(double candidates, const TellsWork& work, bool all, int frame, Observed& seen) {
+  void plain(double candidates, const ReportsWork& work, bool all, int frame, Observed& seen) {
     if (slabs_ && all && frame_ == frame - 1) {
       seen.boxed = seen.plain_boxed = std::max(1.0, candidates / std::max(1.0, seen.candidates));
       choices_ = 0;

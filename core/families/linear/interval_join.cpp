@@ -229,7 +229,7 @@ void IntervalJoin<S>::start_reading() {
     place_.resize(count_);
   }
   for (std::size_t i = 0; i < throughout_; ++i) alive_[i] = primitives_of(i);
-  next_ = alive_count_ = fixed_ = std::uint32_t(throughout_);
+  next_ = alive_count_ = permanent_count_ = std::uint32_t(throughout_);
   waiting_.clear();
   std::fill(std::begin(ending_), std::end(ending_), none);
   present_ = 0;

@@ -78,9 +78,9 @@ class IntervalJoin {
   /// pairs overlap.
   void move_to(float fraction);
   bool overlaps(std::uint32_t pair) const {
-    if (pair < fixed_) return true;
+    if (pair < permanent_count_) return true;
     const std::uint32_t place = place_[pair];
-    return place >= fixed_ && place < alive_count_ && alive_places_[place] == pair;
+    return place >= permanent_count_ && place < alive_count_ && alive_places_[place] == pair;
   }
   /// Touches these marks whenever a pair begins or ends to overlap, until the next join.
   void follow(const FollowingMarks& marks) { following_ = marks; }
@@ -189,7 +189,7 @@ class IntervalJoin {
   /// Alive pairs, in lists by the bucket of their end.
   std::uint32_t ending_[FractionBuckets::count] = {}, present_ = 0;
   std::vector<std::uint32_t> next_ending_;
-  std::uint32_t fixed_ = 0;  ///< so many pairs are the first of `alive_`, in their order
+  std::uint32_t permanent_count_ = 0;  ///< so many pairs are the first of `alive_`, in their order
   FollowingMarks following_;
   /// Only with several threads: the join; [part of the pairs][bucket] the place of the next pair; the pairs
   /// of bodies that were joined.

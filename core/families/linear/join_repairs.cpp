@@ -133,7 +133,8 @@ std::uint64_t IntervalJoin<S>::repair(std::span<const ChangedParts> changed, flo
   if (std::none_of(bodies_.begin(), bodies_.end(), is_changed)) return 0;
   if (reader == Reader::join) {
     if (!reading_) start_reading();
-    for (; fixed_ > 0; --fixed_) place_[fixed_ - 1] = alive_places_[fixed_ - 1] = fixed_ - 1;
+    for (; permanent_count_ > 0; --permanent_count_)
+      place_[permanent_count_ - 1] = alive_places_[permanent_count_ - 1] = permanent_count_ - 1;
   }
   if (!indexed_) index_pairs();
   remove_changed(changed, reader);

@@ -2,8 +2,8 @@
 #include <optional>
 #include <utility>
 
+#include "core/contract/reports_work.hpp"
 #include "core/contract/strategy.hpp"
-#include "core/contract/tells_work.hpp"
 #include "core/families/wide/near_bodies.hpp"
 #include "core/families/wide/surface_sums.hpp"
 #include "core/families/wide/swept_hierarchies.hpp"
@@ -24,7 +24,7 @@ inline Box<S> leaf_box(std::span<const std::uint32_t> vertices, const S* positio
 /// `update(body)`. Bodies that cannot move are updated at `reset` only. Most strategies derive from
 /// StoredHierarchyStrategy, which also accepts changes of plans.
 template <class S>
-class FixedPlansHierarchyStrategy : public CountedStrategy<S>, public AnswersRays<S>, public TellsWork {
+class FixedPlansHierarchyStrategy : public CountedStrategy<S>, public AnswersRays<S>, public ReportsWork {
  public:
   FixedPlansHierarchyStrategy(const SceneView<S>& scene, const SampledMotion<S>& motion,
                               Topologies topologies, const Params& /*params*/,

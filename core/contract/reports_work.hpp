@@ -4,9 +4,9 @@
 namespace kbvh {
 
 /// Tells what its searches cost, also where nothing is counted: for strategies that choose among others.
-class TellsWork {
+class ReportsWork {
  public:
-  virtual ~TellsWork() = default;
+  virtual ~ReportsWork() = default;
   /// Returns the box tests of the last search for pairs.
   virtual std::uint64_t last_box_tests() const = 0;
   /// Makes the search of this frame ahead of its query, if it serves several frames and takes no more than so
