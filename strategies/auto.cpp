@@ -5,8 +5,8 @@
 // trial; and the candidates that slabs at the leaves leave out. The choice depends on counts and plans only,
 // never on a clock, so that a run can be repeated.
 //
-// Each candidate has one instance from the first frame on, with its own hierarchies. This costs the memory of
-// all candidates and saves creating an instance at a change. Inactive instances do not advance.
+// Each candidate has one instance, with its own hierarchies, created with the strategy. This costs the memory
+// of all candidates and saves creating an instance at a change. An instance starts when it is chosen.
 
 #include <algorithm>
 #include <cmath>
@@ -74,12 +74,13 @@ class Auto final : public Strategy<S>,
 
   void reset_to(double t) override {
     for (Runner& runner : runners_) {
-      runner.strategy->reset(t);
-      runner.fresh = true;
+      runner.started = false;
       runner.frames = 0;
       runner.factor = 1;
     }
     retired_ = {};
+    changed_.clear();
+    start(runners_[0], t);
     active_ = 0;
     frame_ = chosen_at_ = 0;
     stay_ = shortest_stay;
@@ -94,7 +95,6 @@ class Auto final : public Strategy<S>,
     changes_of_many_.start_over();
     pairs_asked_ = pairs_in_frame_ = rays_asked_ = false;
     window_ = {};
-    changed_.clear();
     body_changed_.assign(this->scene_.body_count(), 0);
     seen_ = {};
     seen_.reads = steps_.reads();
@@ -135,15 +135,12 @@ class Auto final : public Strategy<S>,
              ((rebuilds() && !rebuilds(last)) || is_active(&plain_cost) || join_.outdated() || refits_first_);
     joins_first_ = active_ != last && is_active(&join_cost);
     Runner& runner = runners_[active_];
-    if (runner.all_positions) fetch_all();
-    if (active_ == last || runner.fresh) {
-      if (window_.begins) begin_window();
+    if (active_ != last) start(runner, t);
+    if (window_.begins) begin_window();
+    if (active_ == last) {
+      if (runner.all_positions) fetch_all();
       runner.strategy->advance(t);
-    } else {
-      restart(runner, t);
-      if (window_.begins) begin_window();
     }
-    for (Runner& other : runners_) other.fresh = false;
     ++runner.frames;
   }
 
@@ -193,8 +190,6 @@ class Auto final : public Strategy<S>,
       changed_.push_back(change);
     }
     runners_[active_].strategy->flight_plans_changed(t, changes);
-    for (std::size_t i = 0; i < runners_.size(); ++i)
-      if (i != active_) runners_[i].fresh = false;
     changes_ = true;
   }
 
@@ -230,7 +225,8 @@ class Auto final : public Strategy<S>,
   void start_counting() override { first_fetch_ = this->sampled_.fetched(); }
   Counters counted() const override {
     Counters table = retired_;
-    for (const Runner& runner : runners_) add(table, runner.strategy->counters());
+    for (const Runner& runner : runners_)
+      if (runner.started) add(table, runner.strategy->counters());
     table[Counter::positions_fetched] = this->sampled_.fetched() - first_fetch_;
     return table;
   }
@@ -242,7 +238,7 @@ class Auto final : public Strategy<S>,
     std::unique_ptr<Strategy<S>> strategy;
     ReportsWork* work = nullptr;  ///< the strategy, if it does
     double factor = 1;            ///< cost over prediction, where it was found to cost more than a refit
-    bool fresh = false;           ///< in the state after `reset`
+    bool started = false;         ///< since `reset`
     int frames = 0;               ///< number of frames that it answered
   };
   /// The number of frames after which the choice is reviewed within one segment, and at the start of a new
@@ -352,13 +348,14 @@ class Auto final : public Strategy<S>,
     savings_counted_until_ = frame_;
     return saved_ + saves * shortest_stay > costs::Choice::start_primitive * seen_.primitives;
   }
-  /// Starts an instance at a time within the clip. It sees the current plans, but not which bodies no longer
-  /// rest.
-  void restart(Runner& runner, double t) {
-    add(retired_, runner.strategy->counters());
-    fetch_all();
+  /// Starts an instance, at the beginning or where it is chosen. It sees the current plans, but not which
+  /// bodies no longer rest.
+  void start(Runner& runner, double t) {
+    if (runner.started) add(retired_, runner.strategy->counters());
+    if (runner.all_positions) fetch_all();
     runner.strategy->reset(t);
     if (!changed_.empty()) runner.strategy->flight_plans_changed(t, changed_);
+    runner.started = true;
   }
   /// Lets a refit answer this frame where the first join after a change of strategy would take many times the
   /// work of a refit in all frames of the segment.
@@ -372,7 +369,7 @@ class Auto final : public Strategy<S>,
     --runners_[active_].frames;
     active_ = 0;
     ++runners_[active_].frames;
-    restart(runners_[active_], t);
+    start(runners_[active_], t);
     changes_of_many_.switched();
     window_ = {};
     stay_ = shortest_stay;
