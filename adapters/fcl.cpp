@@ -312,7 +312,6 @@ class Fcl final : public CountedStrategy<S>, public TakesPlanChanges<S> {
 
   /// Performs FCL's triangle test on the triangles of polygons. FCL itself would compare only triangles with
   /// overlapping boxes.
-  ///
   bool own_verdict(const PrimitivePair& pair) {
     const Primitives& primitives_a = this->scene_.primitives(pair.body_a);
     const Primitives& primitives_b = this->scene_.primitives(pair.body_b);

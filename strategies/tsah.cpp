@@ -41,7 +41,6 @@ class Tsah final : public StoredHierarchyStrategy<S>,
         samples_(std::size_t(params.number("samples"))) {}
 
   /// The trees are made for one clip, so making them is part of its cost.
-  ///
   void reset_to(double t) override {
     for (std::uint32_t body = 0; body < this->hierarchies_.size(); ++body) {
       WideHierarchy<S>& hierarchy = this->hierarchies_[body];

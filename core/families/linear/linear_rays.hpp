@@ -12,7 +12,6 @@ namespace kbvh {
 /// Answers rays at a time of a segment whose boxes are linear in time. A box is interpolated when a ray first
 /// reads it. A body that is apart from all others has only one box in the segment: its boxes are computed
 /// from its positions when a ray enters it.
-///
 template <class S>
 class LinearRays {
  public:

@@ -18,7 +18,6 @@ namespace kbvh {
 /// axis. So a swap changes the set by at most one pair, and ranks alone decide whether it does. The set
 /// matches the three lists at any time; the lists may be advanced one after the other. Ends that touch have
 /// the order that holds right after the touch; if a touch must count, the caller widens boxes.
-///
 template <class S, class Rule = EndOrder>
 class KineticOverlaps {
  public:
@@ -126,7 +125,6 @@ class KineticOverlaps {
     return order.rank(2 * a) < order.rank(2 * b + 1) && order.rank(2 * b) < order.rank(2 * a + 1);
   }
   /// For each box, sums the number of ends between its own ends.
-  ///
   std::size_t best_axis() const {
     std::size_t best = 0;
     std::uint64_t least = std::numeric_limits<std::uint64_t>::max();

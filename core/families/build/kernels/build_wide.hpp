@@ -67,7 +67,6 @@ struct BuildKernels {
   void (*leaf_rows[4])(const LeafRowsJob<S>& job);
   /// Computes the boxes of the 8-wide nodes [0, count) of a hierarchy in which parents have smaller numbers
   /// than their children.
-  ///
   void (*nodes)(WideArrays<S> hierarchy, const S* leaf_boxes, std::uint32_t count);
 };
 KBVH_DECLARE_KERNELS(BuildKernels<float>, build_float)
