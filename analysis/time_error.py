@@ -317,7 +317,7 @@ def _mark(colour: str, marker: str, x: float, y: float, says: str = "", scale: f
 
 
 def _labels(place: Place, front: Sequence[Point], scale: Scale, share: Callable[[Point], float]) -> list[str]:
-    """Writes the numbers of the front, then the values at both ends of each dial, beside their marks, where they cover neither marks nor
+    """Writes the numbers of the front, then the values at both ends of each dial, next to their marks, where they cover neither marks nor
     each other; values without room are left out."""
     slow = place.slow
     taken = [(scale.x(one.time), scale.y(share(one)), 5.0, 4.0) for one in place.points]

@@ -1,7 +1,7 @@
 """Strategies that are written in Python: the way to try an idea in ten minutes.
 
 A strategy answers which pairs of primitives may intersect, frame by frame. kbvh tests its candidates exactly, holds it against
-the truth (`kbvh.check`) and lets it take part in studies (`kbvh.run`) beside the others. It is slow: the interpreter takes part in
+the truth (`kbvh.check`) and lets it take part in studies (`kbvh.run`) with the others. It is slow: the interpreter takes part in
 every time, which compares ideas by their counters, not by their milliseconds.
 """
 

@@ -1,4 +1,4 @@
-"""Serves a built lab to browsers on this machine, and the scenes of a study beside it.
+"""Serves a built lab to browsers on this machine, and with it the scenes of a study.
 
     serve.py FOLDER [--port P] [--study DIR] [--open]
 
@@ -78,7 +78,7 @@ class Handler(SimpleHTTPRequestHandler):
         return None
 
     def end_headers(self) -> None:
-        self.send_header("Cache-Control", "no-cache")  # a lab that was built anew is the one that is shown
+        self.send_header("Cache-Control", "no-cache")  # so that a lab that was built again is the one shown
         super().end_headers()
 
     def log_message(self, format: str, *args: object) -> None:

@@ -1,7 +1,7 @@
 """Gathers the pages of the site: the tree's own Markdown, the pages of this folder, and pages made from registry and results.
 
 usage: stage.py LIST_JSON RESULTS_DIR PAGES_DIR HTML_DIR NOTEBOOKS_DIR
-HTML_DIR holds what stands beside the pages already: lab, lab/lessons, report. NOTEBOOKS_DIR holds the notebooks that were run.
+HTML_DIR already holds what lies next to the pages: lab, lab/lessons, report. NOTEBOOKS_DIR holds the notebooks that were run.
 """
 
 from __future__ import annotations

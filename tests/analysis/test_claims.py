@@ -181,7 +181,7 @@ class TestVerdicts(ClaimsCase):
         self.assertIn("2006 against 2006 met from l = 10 on", row.condition)
 
     def with_another_tablecloth(self, change: Callable[[list[Line]], None] = lambda _: None) -> claims.Row:
-        """E1 with a tablecloth from a file beside ours, on l = 1 and 10 only; `change` is done to that one's results."""
+        """E1 with a tablecloth from a file in addition to ours, on l = 1 and 10 only; `change` is done to that one's results."""
         lines = world()
         others = [copy.deepcopy(one) for one in lines if one["scene"]["name"].startswith("tablecloth-16") and l_of(one) < 100]
         for one in others:

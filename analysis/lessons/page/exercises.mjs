@@ -9,7 +9,7 @@ export const all = { ...states, ...exerciseStates() };
 export const mounted = new Map();
 let loading = null;
 
-/// Loads the lab's script and style once. Both are ordinary files beside the lessons, so that pages work from a folder.
+/// Loads the lab's script and style once. Both are ordinary files next to the lessons, so that pages work from a folder.
 function loadLab() {
   loading ??= new Promise((resolve, reject) => {
     const style = document.createElement("link");

@@ -1,4 +1,4 @@
-// Frames of one cell: the worst ones, the latency over the clip, and query time beside the quality of the tree.
+// Frames of one cell: the worst ones, the latency over the clip, and query time next to the quality of the tree.
 import * as Plot from "@observablehq/plot";
 import { clippedMarks, dotLook, figure, lineLook, logAxis, logScale, meanLook, rowLabels } from "../chart.js";
 import { make, paintOf } from "../dom.js";

@@ -175,7 +175,7 @@ export class Timeline {
 
   /**
    * Plays all frames of a scene just loaded, without a log of events and without snapshots. Returns the milliseconds of each: of the
-   * first one, the start. Load anew before anything else is asked but the state.
+   * first one, the start. Load the scene again before asking for anything but the state.
    */
   time() {
     return [1000 * this.#seconds, ...this.#module.call('time', { times: this.#stops.slice(1).map(({ t }) => t) })];
