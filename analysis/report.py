@@ -93,7 +93,7 @@ def run(options: argparse.Namespace) -> int:
 
 @dataclass(frozen=True)
 class Made:
-    """The page, and what stands on its top."""
+    """The page, and the lines at its top."""
 
     page: Path
     sentences: list[str]

@@ -70,7 +70,7 @@ class Place:
     anchor: str
     points: list[Point]  #: by time
     curves: list[Curve]
-    fronts: dict[str, list[Point]]  #: what nobody dominates in time and error, by column; the fastest first
+    fronts: dict[str, list[Point]]  #: points that no other dominates in time and error, by column; the fastest first
     named: list[Point] = field(default_factory=list)  #: all points on a front, by time
 
     @property
@@ -188,7 +188,7 @@ class Entry:
 
     symbol: Markup  #: in the colours of the panels
     name: str
-    dials: str  #: what its curves turn, and from where to where
+    dials: str  #: the dial that its curves turn, and its range
 
 
 def legend(place: Place, looks: dict[str, tuple[str, str]]) -> list[Entry]:

@@ -2,7 +2,7 @@
 
     serve.py FOLDER [--port P] [--study DIR] [--open]
 
-The lab is at http://127.0.0.1:P/. Of a study (a folder of `kbvh run`), study/scenes.json lists the scenes as
+The lab is at http://127.0.0.1:P/. For a study (a folder of `kbvh run`), study/scenes.json lists the scenes as
 [{"name", "framesPerSecond", "files": [addresses]}] (without a study: none), and the files are served below study/. The server answers only requests
 that name it as 127.0.0.1 or localhost, so that no page of another site can read from it.
 """
