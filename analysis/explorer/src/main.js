@@ -416,7 +416,7 @@ function build() {
   scheme(document.documentElement.dataset.scheme ?? (dark.matches ? "dark" : "light"));
 }
 
-/** Listens to what outlives a change of the results. */
+/** Adds the listeners that outlive a change of the results. */
 function listen() {
   host.filters.addEventListener("keydown", (event) => event.key === "Escape" && showFilters(false));
   host.tabs.addEventListener("keydown", (event) => {

@@ -72,7 +72,7 @@ export async function api() {
   return { createEngine, trace: (request) => trace(createEngine, request) };
 }
 
-/// What makes two states the same work: precision, frames, and the bodies without their names.
+/// The parts that two states of the same work have in common: precision, frames, and the bodies without their names.
 export function essence({ scene, precision = "float64" }) {
   return JSON.stringify([precision, scene.frames?.l ?? 1, scene.bodies.map(({ shape = "polygons", vertices, indices, offsets, times, positions }) => {
     const primitives = offsets ? Array.from(offsets) : Array.from({ length: indices.length / 3 + 1 }, (_, i) => 3 * i);

@@ -214,7 +214,7 @@ function over({ state, choose }, cell, runs, kind, title, reading, unit, samples
   });
 }
 
-/** How much worse than the median is the worst frame, in every cell. */
+/** How much worse than the median the worst frame is, in every cell. */
 function stutter({ model, state, choose }, cells) {
   const of = new Map();
   for (const series of cells.values())

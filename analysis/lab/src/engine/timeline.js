@@ -104,7 +104,7 @@ export class Timeline {
     return this.#go(0, null, 0);
   }
 
-  /** Goes on, event by event, to the first one that `matches`; returns it, packed, or null and stands at `until`. */
+  /** Continues, event by event, to the first one that `matches`; returns it, packed, or stops at `until` and returns null. */
   runEvents(until, matches) {
     for (;;) {
       const step = this.event(until);
@@ -116,7 +116,7 @@ export class Timeline {
     }
   }
 
-  /** Goes on, frame by frame, until a pair begins; returns whether one did. */
+  /** Continues, frame by frame, until a pair begins; returns whether one did. */
   runToPair(until) {
     let before = this.#pairs();
     for (;;) {
