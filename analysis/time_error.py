@@ -347,7 +347,7 @@ def _labels(place: Place, front: Sequence[Point], scale: Scale, share: Callable[
 
 def _said(place: Place, front: Sequence[Point], column: str, title: str) -> str:
     told = "; ".join(f"{one.name}: {text.milliseconds(one.time)} ms, {text.percent(getattr(one, column))}" for one in front)
-    return f"{place.title}. {title} against time per frame; nobody dominates {told}."
+    return f"{place.title}. {title} against time per frame; not dominated: {told}."
 
 
 @dataclass(frozen=True)

@@ -65,8 +65,8 @@ KBVH_STRATEGY(bd_tree) {
            {"tolerance",
             "0.0625",
             {},
-            "no more modes are taken once the rest of the motion is, in the root mean square, below "
-            "this share of the median side of the leaves' boxes; 0: all that there are",
+            "no more modes are added once the rest of the motion is, in the root mean square, below "
+            "this share of the median side of the leaves' boxes; 0: all modes are taken",
             0}},
   })};
 }

@@ -128,8 +128,8 @@ KBVH_STRATEGY(drift_rebuild) {
           {{"measure",
             "work",
             {"work", "surface"},
-            "what says that a tree has drifted: the box tests of queries beyond those when it was "
-            "new, summed over frames; or the surfaces of all boxes over that of the root"},
+            "the measure of a tree's drift: the box tests of queries beyond those when it was new, "
+            "summed over frames; or the surfaces of all boxes over that of the root"},
            {"price",
             "100",
             {},

@@ -252,12 +252,17 @@ KBVH_STRATEGY(reinsertion) {
       .declares = {.restructures = true, .time_budget = true},
       .topology = {.widths = {8}, .preferred = {.method = BuildMethod::sah, .width = 8, .leaf_size = 1}},
       .parameters =
-          {{"tried", "0.1", {}, "subtrees tried per frame, at most, as a share of the primitives", 0, 1},
+          {{"tried",
+            "0.1",
+            {},
+            "maximum number of subtrees tried per frame, as a share of the primitives",
+            0,
+            1},
            {"growth",
             "1.3",
             {},
-            "factor by which the surface of a node has grown since its children were last tried, from which "
-            "on they are tried again",
+            "growth of a node's surface, as a factor since its children were last tried, from which on they "
+            "are tried again",
             1,
             1e6},
            {"price",
@@ -270,7 +275,7 @@ KBVH_STRATEGY(reinsertion) {
            {"least",
             "0.02",
             {},
-            "least gain of a move, as a share of the surface of the node that the subtree leaves",
+            "minimum gain of a move, as a share of the surface of the node that the subtree leaves",
             0,
             1},
            {"lane_price",
@@ -279,6 +284,6 @@ KBVH_STRATEGY(reinsertion) {
             "cost of each child of a node, as a share of the surface of the node",
             0,
             1},
-           {"visits", "16", {}, "nodes visited by one search, at most", 1, 1e6, Numbers::whole}},
+           {"visits", "16", {}, "maximum number of nodes visited by one search", 1, 1e6, Numbers::whole}},
   })};
 }

@@ -109,7 +109,7 @@ KBVH_STRATEGY(rotations) {
       .parameters = {{"most",
                       "4",
                       {},
-                      "exchanges of two grandchildren of one node in one frame, at most",
+                      "maximum number of exchanges per frame, each of two grandchildren of a node",
                       1,
                       1000,
                       Numbers::whole}},

@@ -105,7 +105,7 @@ void prove(const std::string& name) {
         if (log.changes.empty()) continue;
         log.changes.erase(log.changes.begin() + std::ptrdiff_t(log.changes.size() / 2));
         EXPECT_FALSE(check_envelopes(motion, log.below, log.start, log.changes, log.end).holds())
-            << "a store less, and nobody notices";
+            << "a missing store is not noticed";
       }
   }
   std::printf("%s %s: %llu bounds, %llu stores, %llu net changes = %llu breakpoints\n", name.c_str(),

@@ -53,7 +53,8 @@ TEST(DriftKernel, EqualsTheIntervalPointByPoint) {
 TEST(DriftBoxes, BodiesFarApartGetOneBoxAFrame) {
   const Scene<float> scene = grids<float>(40, 50, lifted);
   Play<float> play(scene, "drift_boxes", {});
-  EXPECT_EQ(play.frame(0.01)[Counter::bodies_skipped], 1u) << "nobody knows yet, so all vertices are read";
+  EXPECT_EQ(play.frame(0.01)[Counter::bodies_skipped], 1u)
+      << "nothing is known yet, so all vertices are read";
   const std::uint64_t vertices = scene.bodies[0].plans.vertex_count();
   for (int f = 2; f <= 100; ++f) {
     const Counters frame = play.frame(0.01 * f);
