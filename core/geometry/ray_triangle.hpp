@@ -23,12 +23,11 @@ struct RayMeeting {
 /// through edges and corners meet the triangle, and so do rays that lie in its plane. Degenerate triangles
 /// are the segments or points that their corners span; a ray without direction is a point. `corners` is
 /// [corner][3]. Floats are converted to double without loss.
-/// [corner][3]. Floats are converted to double without any loss.
+///
 /// `meeting` is set if they meet; its error is at most 2^-42 of the parameter. Most tests cost three filtered
 /// volumes (Segura & Feito 2001). If the meeting with another triangle is `known` to be at the same
 /// parameter, a test that the filter leaves open copies it, unless it has been filtered. Allocates only if
 /// exact integers exceed 1024 bits. Needs the default floating-point environment, like the predicates.
-/// predicates.
 bool ray_meets_triangle(const RayLine& ray, const double* corners, RayMeeting& meeting,
                         TriangleTestStats& stats, const RayMeeting* known = nullptr);
 
