@@ -75,7 +75,7 @@ class Corner:
     id: str  #: "" where the check has only one
     name: str  #: in a sentence
     who: str  #: the side that is judged, without what it is compared with
-    short: str  #: beside a picture
+    short: str  #: the text next to a picture
     above: dict[str, Any]  #: the numerator, or the only term
     below: Optional[dict[str, Any]]
     optional: bool  #: its absence leaves the claim decided

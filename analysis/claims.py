@@ -70,7 +70,7 @@ class Row:
     checks: list[dict[str, Any]] = field(default_factory=list)  #: for the data file
     brief: str = ""  #: why, in two sentences
     corners: list[CornerVerdict] = field(default_factory=list)  #: of checks with a square, each for itself
-    shown: str = ""  #: numbers beside the verdict
+    shown: str = ""  #: numbers next to the verdict
     unmeasured: list[str] = field(default_factory=list)  #: corners that were not measured, or not all of them
     as_in_2006: list[str] = field(default_factory=list)  #: corners at their best that are no faster than in 2006
     looked: list[CheckResult] = field(default_factory=list)  #: for the picture and the tables

@@ -31,12 +31,12 @@ struct NodePair {
 ///   void ensure(std::uint32_t node)         makes the node's bound valid at the query's time
 ///   B operator()(std::uint32_t node)        its bound, read only after `ensure`
 /// B is a Box<S> or any other type for which argument-dependent lookup finds `bool overlap(bound of a, bound
-/// of b)`: every BoundingVolume (core/geometry/volumes) has one. An overlap may be false only where no point
-/// is in both. The views of the two bodies may differ. (Stored boxes have their own query:
-/// wide_query.hpp.) Two inner nodes: descend both; one leaf: descend the other. The caller owns the
-/// stack, which grows as needed, so that no work is dropped and a frame allocates nothing. For a body with
-/// itself, each two leaves are visited in both orders. Adds
-/// the overlap tests to `tests`; what on_leaves adds to it counts towards the budget, too.
+/// of b)`: every BoundingVolume (core/geometry/volumes) has one. An overlap may be false only if no point is
+/// in both. The views of the two bodies may differ. (Stored boxes have their own query: wide_query.hpp.) Two
+/// inner nodes: descend both; one leaf: descend the other. The caller owns the stack, which grows as needed,
+/// so that no work is dropped and a frame allocates nothing. For a body with itself, each two leaves are
+/// visited in both orders. Adds the overlap tests to `tests`; tests that on_leaves adds count towards the
+/// budget, too.
 template <class ViewA, class ViewB, class OnLeaves>
 QueryStatus traverse(const Topology& a, ViewA&& bounds_a, const Topology& b, ViewB&& bounds_b,
                      std::vector<NodePair>& stack, std::uint64_t& tests, const Budget& budget,

@@ -1,4 +1,4 @@
-// Counts of box tests: those of one tree are the same under every strategy that searches it in the same way.
+// Counts of box tests: for one tree they are the same under every strategy that searches it in the same way.
 
 #include <gtest/gtest.h>
 
@@ -13,7 +13,7 @@ namespace {
 
 constexpr auto waves = [](std::uint32_t i) { return 0.1 * std::sin(0.3 * i); };
 
-/// The box tests of the query at t = 0, when every tree is new and every box tight, and at 0.5.
+/// Returns the box tests of the queries at t = 0, when every tree is new and every box tight, and at 0.5.
 std::array<std::uint64_t, 2> box_tests(const std::string& id,
                                        const std::map<std::string, std::string>& params,
                                        const Scene<float>& scene, const Budget& budget = {}) {
@@ -58,9 +58,8 @@ TEST(BoxCounts, OneTreeOfBoxesTakesTheSameTests) {
   for (const char* const id : with_wide_boxes) EXPECT_EQ(box_tests(id, {}, scene), expected) << id;
 }
 
-// Trees of one leaf: whatever the volume is, only the primitives' boxes are compared, after the roots.
-// Eight-wide layouts, of boxes, spheres and oriented boxes, compare the leaf again as the child of its node,
-// twice.
+// Trees of one leaf: for any volume, only the primitives' boxes are compared, after the roots. Eight-wide
+// layouts, of boxes, spheres and oriented boxes, compare the leaf again as the child of its node, twice.
 TEST(BoxCounts, TwoLeavesTakeTheSameTestsOfPrimitives) {
   const Scene<float> scene = grids<float>(2, 0.2, waves);
   const std::uint64_t primitives = 8 + 8 * 8;
@@ -71,7 +70,7 @@ TEST(BoxCounts, TwoLeavesTakeTheSameTestsOfPrimitives) {
     EXPECT_EQ(box_tests(id, {}, scene)[0], 1 + primitives) << id;
 }
 
-// Bodies far from each other take the test of their roots, of whatever volume.
+// Bodies far from each other cost the test of their roots, for any volume.
 TEST(BoxCounts, RootsApartTakeOneTest) {
   const Scene<float> scene = grids<float>(24, 20, waves);
   std::vector<std::string> ids(std::begin(with_wide_boxes), std::end(with_wide_boxes));

@@ -141,7 +141,7 @@ std::uint64_t IntervalJoin<S>::repair(std::span<const ChangedParts> changed, flo
   const std::uint64_t before = tests();
   leaf_join_.throughout.found = leaf_join_.partly.found = 0;
   found_.clear();
-  const bool slabs = std::exchange(with_slabs_, false);  // those of changed leaves hold no longer
+  const bool slabs = std::exchange(with_slabs_, false);  // slabs of changed leaves are no longer valid
   while (found_.size() < bodies_.size()) {
     traversal_ = {};
     const BodyPair& pair = bodies_[found_.size()];
@@ -165,7 +165,7 @@ std::uint64_t IntervalJoin<S>::repair(std::span<const ChangedParts> changed, flo
   return tests() - before;
 }
 
-// The header announces instances of the whole class, so that every member is instantiated where it is
+// The header declares the instances of the whole class, so every member must be instantiated where it is
 // defined.
 template void IntervalJoin<float>::index_pairs();
 template void IntervalJoin<float>::link(std::uint32_t);
