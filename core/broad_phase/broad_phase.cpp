@@ -263,6 +263,13 @@ void BroadPhase<S>::forget_trees() {
 }
 
 template <class S>
+void BroadPhase<S>::refresh() {
+  elements();
+  for (ElementTree<S>& tree : trees_)
+    if (tree.state() == ElementTree<S>::State::outdated) tree.refresh(boxes_.data(), settings_.most_growth);
+}
+
+template <class S>
 ElementTree<S>& BroadPhase<S>::current_tree(Element element) {
   ElementTree<S>& tree = trees_[std::size_t(element)];
   tree.refresh(boxes_.data(), settings_.most_growth);

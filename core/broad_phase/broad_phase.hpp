@@ -65,6 +65,9 @@ class BroadPhase {
   /// a vertex out of range, and std::logic_error after a swept update.
   void update(const MatrixView<S>& v, std::span<const std::uint32_t> moved);
 
+  /// Makes the trees of earlier searches current now; the next search does it otherwise.
+  void refresh();
+
   /// Finds candidates of one kind, into the caller's list, which is replaced. See `valid_for` for what stays.
   void detect(CandidateKind kind, CandidateBuffer& out);
   void detect_vertex_vertex_candidates(CandidateBuffer& out) { detect(CandidateKind::vertex_vertex, out); }

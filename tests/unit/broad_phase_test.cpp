@@ -206,8 +206,7 @@ TYPED_TEST(BroadPhases, CandidatesHoldWithinABound) {
     EXPECT_EQ(broad.detections(), detected);
     EXPECT_EQ(broad.references(), 2u);
     // One coordinate of one vertex leaves it.
-    mesh.v0[100] = start.v0[100] + S(0.11);
-    if (swept) mesh.v1[100] = mesh.v0[100];
+    mesh.v0[100] = (swept ? std::max(start.v0[100], start.v1[100]) : start.v0[100]) + S(0.11);
     mesh.update(broad);
     EXPECT_EQ(broad.references(), 3u);
     EXPECT_EQ(broad.left(), bound);
