@@ -353,15 +353,15 @@ void BroadPhase<S>::detect(CandidateKind kind, CandidateBuffer& out) {
 }
 
 template <class S>
-void BroadPhase<S>::within(CandidateKind kind, S distance, CandidateBuffer& out) {
+void BroadPhase<S>::within(CandidateKind kind, double distance, CandidateBuffer& out) {
   elements();
-  if (!(distance >= 0 && distance <= radius_))
+  if (!(distance >= 0 && distance <= double(radius_)))
     throw std::invalid_argument("within() takes a distance from 0 to the radius " +
-                                number_text(double(radius_)) + ", not " + number_text(double(distance)));
+                                number_text(double(radius_)) + ", not " + number_text(distance));
   const CandidateBuffer& found = kept(kind);
   const S* const points = motion_ == Motion::straight ? end_points_.data() : points_.data();
   out.resize(found.size());
-  out.resize(keep_within<S>(kind, *elements_, points, double(distance), found, out.data()));
+  out.resize(keep_within<S>(kind, *elements_, points, distance, found, out.data()));
 }
 
 template <class S>

@@ -83,7 +83,7 @@ class BroadPhase {
   /// Finds the pairs of elements whose distance is at most `distance`, exactly: the answer is that of real
   /// arithmetic on the given numbers. For a motion, at its end. Edges and faces are closed; degenerate ones
   /// are what their corners span. Throws std::invalid_argument unless 0 <= distance <= radius.
-  void within(CandidateKind kind, S distance, CandidateBuffer& out);
+  void within(CandidateKind kind, double distance, CandidateBuffer& out);
 
   /// From now on candidates hold for all positions in which no coordinate of a vertex differs by more than
   /// `displacement` from its value at the last detection: updates within that bound cost a comparison and
