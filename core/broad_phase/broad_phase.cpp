@@ -365,6 +365,18 @@ void BroadPhase<S>::within(CandidateKind kind, double distance, CandidateBuffer&
 }
 
 template <class S>
+EarliestImpact BroadPhase<S>::earliest_impact(EarliestImpactStats* stats) {
+  elements();
+  if (motion_ != Motion::straight)
+    throw std::logic_error("an impact is asked for without a motion from V0 to V1");
+  EarliestImpact earliest;
+  for (const CandidateKind kind : {CandidateKind::face_vertex, CandidateKind::edge_edge})
+    take_earlier_impacts<S>(kind, *elements_, points_.data(), end_points_.data(), kept(kind), earliest,
+                            stats);
+  return earliest;
+}
+
+template <class S>
 std::size_t BroadPhase<S>::bytes() const {
   std::size_t total = (points_.capacity() + end_points_.capacity() + boxes_.capacity() +
                        displacements_.capacity() + grown_each_.capacity()) *

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "core/broad_phase/earliest_impact.hpp"
 #include "core/broad_phase/element_tree.hpp"
 #include "core/broad_phase/elements.hpp"
 #include "core/families/wide/kernels/wide_overlap.hpp"
@@ -84,6 +85,11 @@ class BroadPhase {
   /// arithmetic on the given numbers. For a motion, at its end. Edges and faces are closed; degenerate ones
   /// are what their corners span. Throws std::invalid_argument unless 0 <= distance <= radius.
   void within(CandidateKind kind, double distance, CandidateBuffer& out);
+
+  /// Finds the first contact of a vertex and a face, or of two edges, during the motion from V0 to V1: exact
+  /// verdicts in real arithmetic on the given numbers, no epsilon (core/continuous/impact.hpp). Contact at
+  /// t = 0 counts. Throws std::logic_error unless the last positions were a motion.
+  EarliestImpact earliest_impact(EarliestImpactStats* stats = nullptr);
 
   /// From now on candidates hold for all positions in which no coordinate of a vertex differs by more than
   /// `displacement` from its value at the last detection: updates within that bound cost a comparison and

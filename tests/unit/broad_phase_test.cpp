@@ -235,6 +235,56 @@ TYPED_TEST(BroadPhases, BoundsHoldForMovedVerticesToo) {
   }
 }
 
+TYPED_TEST(BroadPhases, TheEarliestImpactIsThatOfAllPairs) {
+  using S = TypeParam;
+  int touching = 0;
+  for (std::uint64_t seed = 0; seed < 600; ++seed) {
+    const Mesh<S> mesh = random_mesh<S>(seed);
+    if (!mesh.swept()) continue;
+    BroadPhase<S> broad;
+    mesh.build(broad, S(0));
+    const Elements elements = mesh.elements();
+    double end = 2;
+    for (const CandidateKind kind : {CandidateKind::face_vertex, CandidateKind::edge_edge})
+      for_all_pairs(elements, kind, [&](const Candidate& pair) {
+        std::vector<std::uint32_t> vertices;
+        const auto add = [&](Element element, std::uint32_t id) {
+          const auto of = elements.vertices(element, id);
+          vertices.insert(vertices.end(), of.begin(), of.end());
+        };
+        const bool edges = kind == CandidateKind::edge_edge;
+        edges ? add(Element::edge, pair.first) : add(Element::vertex, pair.second);
+        edges ? add(Element::edge, pair.second) : add(Element::face, pair.first);
+        double numbers[2][4][3];
+        MovingPoints points{};
+        for (std::size_t i = 0; i < 4; ++i) {
+          for (std::size_t k = 0; k < 3; ++k) {
+            numbers[0][i][k] = double(mesh.v0[3 * vertices[i] + k]);
+            numbers[1][i][k] = double(mesh.v1[3 * vertices[i] + k]);
+          }
+          points.begin[i] = numbers[0][i];
+          points.end[i] = numbers[1][i];
+        }
+        const Impact impact =
+            find_impact(edges ? Contact::Kind::edge_edge : Contact::Kind::vertex_face, points);
+        if (impact.touches) end = std::min(end, impact.end);
+      });
+    EarliestImpactStats stats;
+    const EarliestImpact found = broad.earliest_impact(&stats);
+    ASSERT_EQ(found.touches, end <= 1) << seed;
+    if (found.touches) {
+      ++touching;
+      EXPECT_EQ(found.end, end) << seed;
+      EXPECT_EQ(found.begin, std::max(0.0, end - impact_width)) << seed;
+    }
+    EXPECT_EQ(stats.later + stats.impacts.tests, stats.candidates);
+  }
+  EXPECT_GT(touching, 50);
+  BroadPhase<S> broad;
+  crumpled<S>(4, 1).build(broad, S(0));
+  EXPECT_THROW(broad.earliest_impact(), std::logic_error);
+}
+
 // ---- Seeded faults: what these tests compare with finds them ----------------------------------------------
 
 TYPED_TEST(BroadPhases, ForgottenVerticesAreCaught) {
