@@ -74,7 +74,7 @@ template <bool down, class S>
   } else {
     const Words off = down ? Words(error < S(0)) : Words(error > S(0));   // -1 where it has to be moved
     const Words away = down ? Words(total > S(0)) : Words(total < S(0));  // ... towards 0
-    words += off & ((away & -2) + 1);
+    words += off & ((away & Bits(-2)) + Bits(1));
   }
   Part<S> result;
   __builtin_memcpy(&result, &words, sizeof result);
