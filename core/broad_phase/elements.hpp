@@ -47,13 +47,13 @@ struct MatrixView {
       : MatrixView(matrix.data(), std::size_t(matrix.rows()), std::size_t(matrix.cols()), matrix.rowStride(),
                    matrix.colStride()) {}
 
-  /// Views `rows` x `columns` entries that are stored row by row.
-  static MatrixView by_rows(const T* first, std::size_t rows, std::size_t columns) {
-    return {first, rows, columns, std::ptrdiff_t(columns), 1};
+  /// Views entries that are stored row by row.
+  static MatrixView by_rows(const T* first, std::size_t row_count, std::size_t column_count) {
+    return {first, row_count, column_count, std::ptrdiff_t(column_count), 1};
   }
-  /// Views `rows` x `columns` entries that are stored column by column, as Eigen stores them by default.
-  static MatrixView by_columns(const T* first, std::size_t rows, std::size_t columns) {
-    return {first, rows, columns, 1, std::ptrdiff_t(rows)};
+  /// Views entries that are stored column by column, as Eigen stores them by default.
+  static MatrixView by_columns(const T* first, std::size_t row_count, std::size_t column_count) {
+    return {first, row_count, column_count, 1, std::ptrdiff_t(row_count)};
   }
   T operator()(std::size_t row, std::size_t column) const {
     return data[std::ptrdiff_t(row) * row_step + std::ptrdiff_t(column) * column_step];

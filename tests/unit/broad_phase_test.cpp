@@ -46,7 +46,8 @@ TYPED_TEST(BroadPhases, FindWhatAllPairsFind) {
   for (std::uint64_t seed = 0; seed < 10'000; ++seed) {
     const Mesh<S> mesh = random_mesh<S>(seed);
     const S radius = random_radius<S>(seed);
-    BroadPhase<S> broad({.leaf_size = seed % 2 == 0 ? 8U : 16U, .kernels = sets[seed % sets.size()]});
+    BroadPhase<S> broad(
+        BroadPhaseSettings{.leaf_size = seed % 2 == 0 ? 8U : 16U, .kernels = sets[seed % sets.size()]});
     mesh.build(broad, radius);
     ASSERT_EQ(wrong_candidates(broad, mesh, radius), "") << "seed " << seed << ", radius " << radius;
   }
@@ -57,7 +58,7 @@ TYPED_TEST(BroadPhases, FindWhatAllPairsFindInDeepTrees) {
   for (const std::uint32_t leaf_size : {5U, 8U, 16U})
     for (const KernelSet set : supported_kernel_sets()) {
       Mesh<S> mesh = crumpled<S>(24, leaf_size);
-      BroadPhase<S> broad({.leaf_size = leaf_size, .kernels = set});
+      BroadPhase<S> broad(BroadPhaseSettings{.leaf_size = leaf_size, .kernels = set});
       mesh.build(broad, S(0.05));
       ASSERT_EQ(wrong_candidates(broad, mesh, S(0.05)), "") << name(set);
       EXPECT_GT(broad.candidates(CandidateKind::edge_edge).size(), 3000u);
@@ -78,7 +79,7 @@ TYPED_TEST(BroadPhases, AllSetsOfKernelsAndBothWaysToTheTreesAgree) {
   for (const CandidateKind kind : candidate_kinds) {
     reference.clear();
     for (const KernelSet set : supported_kernel_sets()) {
-      BroadPhase<S> broad({.kernels = set});
+      BroadPhase<S> broad(BroadPhaseSettings{.kernels = set});
       first.build(broad, S(0.1));
       broad.detect(kind, found);
       second.update(broad);
@@ -143,7 +144,7 @@ TYPED_TEST(BroadPhases, UpdatesOfMovedVerticesEqualUpdatesOfAll) {
   using S = TypeParam;
   for (const KernelSet set : supported_kernel_sets()) {
     Mesh<S> mesh = crumpled<S>(30, 5);
-    BroadPhase<S> part({.kernels = set}), whole({.kernels = set});
+    BroadPhase<S> part(BroadPhaseSettings{.kernels = set}), whole({.kernels = set});
     mesh.build(part, S(0.05));
     mesh.build(whole, S(0.05));
     Random random(9);
@@ -385,9 +386,9 @@ TYPED_TEST(BroadPhases, WrongInputIsNamedAndChangesNothing) {
   EXPECT_NE(complaint([&] { broad.valid_for(std::vector<S>(3, S(1))); }), "");
   EXPECT_NE(complaint([&] { good.build(broad, nan); }), "");
   EXPECT_NE(complaint([&] { good.build(broad, S(-1)); }), "");
-  EXPECT_NE(complaint([&] { BroadPhase<S>({.leaf_size = 4}); }), "");
-  EXPECT_NE(complaint([&] { BroadPhase<S>({.leaf_size = 17}); }), "");
-  EXPECT_NE(complaint([&] { BroadPhase<S>({.most_growth = 0.5}); }), "");
+  EXPECT_NE(complaint([&] { BroadPhase<S>(BroadPhaseSettings{.leaf_size = 4}); }), "");
+  EXPECT_NE(complaint([&] { BroadPhase<S>(BroadPhaseSettings{.leaf_size = 17}); }), "");
+  EXPECT_NE(complaint([&] { BroadPhase<S>(BroadPhaseSettings{.most_growth = 0.5}); }), "");
   broad.update(good.begin(), good.begin());
   EXPECT_NE(complaint([&] { broad.update(good.begin(), std::vector<std::uint32_t>{1}); }), "");
   EXPECT_EQ(wrong_candidates(broad, good, S(0.1)), "");
