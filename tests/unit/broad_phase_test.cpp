@@ -144,7 +144,7 @@ TYPED_TEST(BroadPhases, UpdatesOfMovedVerticesEqualUpdatesOfAll) {
   using S = TypeParam;
   for (const KernelSet set : supported_kernel_sets()) {
     Mesh<S> mesh = crumpled<S>(30, 5);
-    BroadPhase<S> part(BroadPhaseSettings{.kernels = set}), whole({.kernels = set});
+    BroadPhase<S> part(BroadPhaseSettings{.kernels = set}), whole(BroadPhaseSettings{.kernels = set});
     mesh.build(part, S(0.05));
     mesh.build(whole, S(0.05));
     Random random(9);
