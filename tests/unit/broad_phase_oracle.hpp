@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "core/broad_phase/broad_phase.hpp"
-#include "tests/support/synthetic_scenes.hpp"
+#include "tests/support/random.hpp"
 
 namespace kbvh::test::broad_phase {
 
