@@ -85,10 +85,10 @@ void for_all_pairs(const Elements& elements, CandidateKind kind, const Take& tak
       if (!elements.incident(kind, {a, b})) take(Candidate{a, b});
 }
 
+/// Finds candidates, given the boxes of vertices.
 template <class S>
-Pairs brute_force(const Mesh<S>& mesh, CandidateKind kind, S radius) {
+Pairs brute_force(const Mesh<S>& mesh, CandidateKind kind, const std::vector<Box<S>>& boxes) {
   const Elements elements = mesh.elements();
-  const std::vector<Box<S>> boxes = vertex_boxes(mesh, radius);
   std::array<std::vector<Box<S>>, element_kinds> all;
   for (std::size_t element = 0; element < element_kinds; ++element)
     for (std::uint32_t id = 0; id < elements.lists[element].count(); ++id) {
@@ -103,6 +103,11 @@ Pairs brute_force(const Mesh<S>& mesh, CandidateKind kind, S radius) {
       found.insert(pair);
   });
   return found;
+}
+
+template <class S>
+Pairs brute_force(const Mesh<S>& mesh, CandidateKind kind, S radius) {
+  return brute_force(mesh, kind, vertex_boxes(mesh, radius));
 }
 
 // ---- Distances in rationals -------------------------------------------------------------------------------
@@ -207,16 +212,38 @@ std::vector<Point> corners(const Mesh<S>& mesh, std::span<const std::uint32_t> v
   return points;
 }
 
+/// The squared distances of pairs of elements.
+using Distances = std::vector<std::pair<Candidate, Rational>>;
 template <class S>
-Pairs brute_force_within(const Mesh<S>& mesh, CandidateKind kind, S distance) {
+Rational squared_distance(const Mesh<S>& mesh, const Elements& elements, CandidateKind kind,
+                          const Candidate& pair) {
+  return squared_distance(kind, corners(mesh, elements.vertices(first_element(kind), pair.first)),
+                          corners(mesh, elements.vertices(second_element(kind), pair.second)));
+}
+/// Of all pairs.
+template <class S>
+Distances all_distances(const Mesh<S>& mesh, CandidateKind kind) {
   const Elements elements = mesh.elements();
-  Pairs found;
+  Distances all;
   for_all_pairs(elements, kind, [&](const Candidate& pair) {
-    const Rational d =
-        squared_distance(kind, corners(mesh, elements.vertices(first_element(kind), pair.first)),
-                         corners(mesh, elements.vertices(second_element(kind), pair.second)));
-    if (d <= Rational(distance) * Rational(distance)) found.insert(pair);
+    all.emplace_back(pair, squared_distance(mesh, elements, kind, pair));
   });
+  return all;
+}
+/// Of the pairs whose boxes, grown by half of a distance, overlap: no others are within it.
+template <class S>
+Distances near_distances(const Mesh<S>& mesh, CandidateKind kind, S distance) {
+  const Elements elements = mesh.elements();
+  Distances near;
+  for (const Candidate& pair : brute_force(mesh, kind, distance))
+    near.emplace_back(pair, squared_distance(mesh, elements, kind, pair));
+  return near;
+}
+inline Pairs within(const Distances& distances, double distance) {
+  Pairs found;
+  const Rational squared_limit = Rational(distance) * Rational(distance);
+  for (const auto& [pair, squared_distance] : distances)
+    if (squared_distance <= squared_limit) found.insert(pair);
   return found;
 }
 

@@ -12,10 +12,11 @@ namespace {
 template <class S>
 std::string wrong_candidates(BroadPhase<S>& broad, const Mesh<S>& mesh, S radius, More more = More::wrong) {
   const Elements elements = mesh.elements();
+  const std::vector<Box<S>> boxes = vertex_boxes(mesh, radius);
   CandidateBuffer found;
   for (const CandidateKind kind : candidate_kinds) {
     broad.detect(kind, found);
-    const Pairs expected = brute_force(mesh, kind, radius);
+    const Pairs expected = brute_force(mesh, kind, boxes);
     std::string wrong = difference(found, expected, elements, kind, more);
     if (wrong.empty()) wrong = difference(broad.candidates(kind), expected, elements, kind, more);
     if (!wrong.empty()) return wrong;
@@ -23,14 +24,30 @@ std::string wrong_candidates(BroadPhase<S>& broad, const Mesh<S>& mesh, S radius
   return {};
 }
 
+/// Compares distances of all pairs of a small mesh with each of several distances.
 template <class S>
-std::string wrong_within(BroadPhase<S>& broad, const Mesh<S>& mesh, S distance) {
+std::string wrong_within(BroadPhase<S>& broad, const Mesh<S>& mesh, std::initializer_list<S> distances) {
   CandidateBuffer found;
   for (const CandidateKind kind : candidate_kinds) {
+    const Distances all = all_distances(mesh, kind);
+    for (const S distance : distances) {
+      broad.within(kind, distance, found);
+      const std::string wrong = difference(found, within(all, distance), mesh.elements(), kind);
+      if (!wrong.empty()) return "within " + std::to_string(distance) + ": " + wrong;
+    }
+  }
+  return {};
+}
+
+/// Compares distances of vertices and faces, and of edges, of a larger mesh.
+template <class S>
+std::string wrong_near(BroadPhase<S>& broad, const Mesh<S>& mesh, S distance) {
+  CandidateBuffer found;
+  for (const CandidateKind kind : {CandidateKind::face_vertex, CandidateKind::edge_edge}) {
     broad.within(kind, distance, found);
-    const std::string wrong =
-        difference(found, brute_force_within(mesh, kind, distance), mesh.elements(), kind);
-    if (!wrong.empty()) return "within " + std::to_string(distance) + ": " + wrong;
+    const Pairs expected = within(near_distances(mesh, kind, distance), distance);
+    const std::string wrong = difference(found, expected, mesh.elements(), kind);
+    if (!wrong.empty()) return "near " + std::to_string(distance) + ": " + wrong;
   }
   return {};
 }
@@ -99,7 +116,7 @@ TYPED_TEST(BroadPhases, AllSetsOfKernelsAndBothWaysToTheTreesAgree) {
 TYPED_TEST(BroadPhases, DistancesAreExact) {
   using S = TypeParam;
   int near = 0;
-  for (std::uint64_t seed = 0; seed < 1500; ++seed) {
+  for (std::uint64_t seed = 0; seed < 250; ++seed) {
     const Mesh<S> mesh = random_mesh<S>(seed);
     const S radius = random_radius<S>(seed);
     BroadPhase<S> broad;
@@ -107,10 +124,9 @@ TYPED_TEST(BroadPhases, DistancesAreExact) {
     CandidateBuffer found;
     broad.within(CandidateKind::face_vertex, radius, found);
     near += found.empty() ? 0 : 1;
-    for (const S distance : {radius, radius / 2, S(0)})
-      ASSERT_EQ(wrong_within(broad, mesh, distance), "") << "seed " << seed;
+    ASSERT_EQ(wrong_within(broad, mesh, {radius, radius / 2, S(0)}), "") << "seed " << seed;
   }
-  EXPECT_GT(near, 200);
+  EXPECT_GT(near, 30);
 }
 
 /// Distances that are equal to the radius, or that differ from it by less than an ulp of its square.
@@ -136,8 +152,7 @@ TYPED_TEST(BroadPhases, DistancesAtTheRadius) {
   EXPECT_FALSE(contains(count(CandidateKind::face_vertex, below), {0, 3}));
   EXPECT_TRUE(contains(count(CandidateKind::vertex_vertex, height), {2, 6}));  // (0, 3, 4)
   EXPECT_FALSE(contains(count(CandidateKind::vertex_vertex, below), {2, 6}));
-  ASSERT_EQ(wrong_within(broad, mesh, height), "");
-  ASSERT_EQ(wrong_within(broad, mesh, below), "");
+  ASSERT_EQ(wrong_within(broad, mesh, {height, below}), "");
 }
 
 TYPED_TEST(BroadPhases, UpdatesOfMovedVerticesEqualUpdatesOfAll) {
@@ -200,7 +215,9 @@ TYPED_TEST(BroadPhases, CandidatesHoldWithinABound) {
       }
       mesh.update(broad);
       ASSERT_EQ(wrong_candidates(broad, mesh, S(0.05), More::allowed), "") << "step " << step;
-      ASSERT_EQ(wrong_within(broad, mesh, S(0.03)), "") << "step " << step;
+      if (step % 6 == 0) {
+        ASSERT_EQ(wrong_near(broad, mesh, S(0.03)), "") << "step " << step;
+      }
       EXPECT_GT(broad.left(), 0);
       EXPECT_LT(broad.left(), S(0.01));
     }
@@ -232,7 +249,7 @@ TYPED_TEST(BroadPhases, BoundsHoldForMovedVerticesToo) {
     broad.update(mesh.begin(), moved);
     EXPECT_EQ(broad.references(), step < 4 ? 2u : 3u) << step;
     ASSERT_EQ(wrong_candidates(broad, mesh, S(0.05), More::allowed), "") << step;
-    ASSERT_EQ(wrong_within(broad, mesh, S(0.05)), "") << step;
+    ASSERT_EQ(wrong_near(broad, mesh, S(0.05)), "") << step;
   }
 }
 
