@@ -79,11 +79,14 @@ S half_up(S a) {
   return half + half < a ? std::nextafter(half, std::numeric_limits<S>::infinity()) : half;
 }
 
+/// Returns the smallest S that is not less than a length. Throws std::invalid_argument unless it is one.
 template <class S>
-void check_length(S length, const char* what) {
-  if (!(length >= 0 && length <= admissible_magnitude<S>))
-    throw std::invalid_argument(std::string(what) + " is " + number_text(double(length)) +
+S length_up(double length, const char* what) {
+  if (!(length >= 0 && length <= double(admissible_magnitude<S>)))
+    throw std::invalid_argument(std::string(what) + " is " + number_text(length) +
                                 ", not a number from 0 to " + admissible_text<S>());
+  const S rounded = S(length);
+  return double(rounded) < length ? std::nextafter(rounded, std::numeric_limits<S>::infinity()) : rounded;
 }
 
 }  // namespace
@@ -107,14 +110,14 @@ const Elements& BroadPhase<S>::elements() const {
 }
 
 template <class S>
-void BroadPhase<S>::start(const MatrixView<S>& v0, const MatrixView<S>& v1, Elements elements, S radius,
+void BroadPhase<S>::start(const MatrixView<S>& v0, const MatrixView<S>& v1, Elements elements, double radius,
                           Motion motion) {
-  check_length(radius, "the radius");
+  const S rounded = length_up<S>(radius, "the radius");
   check_positions(v0, elements.vertex_count(), motion == Motion::none ? "V" : "V0");
   if (motion == Motion::straight) check_positions(v1, elements.vertex_count(), "V1");
   elements_ = std::move(elements);
-  radius_ = radius;
-  half_radius_ = half_up(radius);
+  radius_ = rounded;
+  half_radius_ = half_up(rounded);
   const std::size_t vertices = elements_->vertex_count();
   points_.resize(4 * vertices);
   end_points_.clear();
@@ -233,10 +236,9 @@ void BroadPhase<S>::update(const MatrixView<S>& v, std::span<const std::uint32_t
 }
 
 template <class S>
-void BroadPhase<S>::valid_for(S displacement) {
+void BroadPhase<S>::valid_for(double displacement) {
   elements();
-  check_length(displacement, "the displacement");
-  displacement_ = displacement;
+  displacement_ = length_up<S>(displacement, "the displacement");
   displacements_.clear();
   grown_each_.clear();
   refer_to_present();
@@ -247,7 +249,7 @@ void BroadPhase<S>::valid_for(std::span<const S> displacements) {
   if (displacements.size() != elements().vertex_count())
     throw std::invalid_argument("there are " + std::to_string(displacements.size()) + " displacements for " +
                                 std::to_string(elements_->vertex_count()) + " vertices");
-  for (const S displacement : displacements) check_length(displacement, "a displacement");
+  for (const S displacement : displacements) length_up<S>(double(displacement), "a displacement");
   displacement_ = 0;
   displacements_.assign(displacements.begin(), displacements.end());
   grown_each_.resize(displacements.size());
@@ -310,12 +312,16 @@ void BroadPhase<S>::take_leaf_pairs(CandidateKind kind, const ElementLeaves<S>& 
                                     std::size_t count, CandidateBuffer& out) {
   const auto pairs =
       element_pair_kernels<S>(kernels_).of[settings_.leaf_size <= 8 ? 0 : 1][std::size_t(kind)];
+  // Memory that is reserved and not written costs next to nothing; copies of long lists do.
+  const std::size_t room_at_first =
+      element_pairs_step +
+      std::size_t(4) * (elements_->count(first_element(kind)) + elements_->count(second_element(kind)));
   ElementPairsJob<S> job{a, b, leaf_pairs_.data(), 0, count, nullptr, 0, 0, 0};
   while (job.next < job.count) {
     // The kernel writes into the list itself, as far as its memory reaches.
     const std::size_t before = out.size();
     if (out.capacity() - before < element_pairs_step)
-      out.reserve(std::max<std::size_t>(2 * out.capacity(), before + 16 * element_pairs_step));
+      out.reserve(std::max<std::size_t>(4 * out.capacity(), before + room_at_first));
     out.resize(out.capacity());
     job.out = &out[before].first;
     job.found = 0;

@@ -15,7 +15,7 @@ namespace kbvh {
 
 struct BroadPhaseSettings {
   /// The most elements in a leaf of the trees: 5 to 16. 8 and 16 fill the vector units.
-  std::uint32_t leaf_size = 8;
+  std::uint32_t leaf_size = 16;
   /// A tree is built again where its nodes' surface has grown beyond this factor since it was built.
   double most_growth = 2;
   /// The instruction set; nothing: the widest that this processor supports. All compute the same bits.
@@ -45,15 +45,17 @@ class BroadPhase {
   BroadPhase& operator=(const BroadPhase&) = delete;
 
   /// Takes a mesh: positions V (n x 3), edges E (m x 2), faces F (k x 3), and the largest distance between
-  /// elements that `within` will be asked for. Indices are checked and copied; a bound of `valid_for` ends.
-  /// Throws as `make_elements` does, and std::invalid_argument for a radius that is negative or no number.
+  /// elements that `within` will be asked for, rounded up to S. Indices are checked and copied; a bound of
+  /// `valid_for` ends. Throws as `make_elements` does, and std::invalid_argument for a radius that is
+  /// negative or no number.
   template <IndexMatrix Edges, IndexMatrix Faces>
-  void build(const MatrixView<S>& v, const Edges& e, const Faces& f, S radius = 0) {
+  void build(const MatrixView<S>& v, const Edges& e, const Faces& f, double radius = 0) {
     start(v, v, make_elements(v.rows, view_of(e), view_of(f)), radius, Motion::none);
   }
   /// Takes a mesh whose vertices move from V0 to V1.
   template <IndexMatrix Edges, IndexMatrix Faces>
-  void build(const MatrixView<S>& v0, const MatrixView<S>& v1, const Edges& e, const Faces& f, S radius = 0) {
+  void build(const MatrixView<S>& v0, const MatrixView<S>& v1, const Edges& e, const Faces& f,
+             double radius = 0) {
     start(v0, v1, make_elements(v0.rows, view_of(e), view_of(f)), radius, Motion::straight);
   }
 
@@ -97,7 +99,7 @@ class BroadPhase {
   /// and the next question detects again. Candidates are then pairs that can become candidates within the
   /// bound; `within` is exact at the present positions all the same. 0 ends this. Throws
   /// std::invalid_argument for a displacement that is negative or no number.
-  void valid_for(S displacement);
+  void valid_for(double displacement);
   /// The same with a bound for each vertex.
   void valid_for(std::span<const S> displacements);
   /// Returns by how much every coordinate of every vertex may still change before candidates are detected
@@ -125,7 +127,8 @@ class BroadPhase {
 
  private:
   enum class Motion : std::uint8_t { none, straight };
-  void start(const MatrixView<S>& v0, const MatrixView<S>& v1, Elements elements, S radius, Motion motion);
+  void start(const MatrixView<S>& v0, const MatrixView<S>& v1, Elements elements, double radius,
+             Motion motion);
   void take(const MatrixView<S>& v0, const MatrixView<S>& v1, Motion motion);
   VertexBoxesJob<S> vertex_job(const MatrixView<S>& v0, const MatrixView<S>& v1);
   VertexBoxesJob<S> packed_job();

@@ -1,8 +1,6 @@
 #include "core/broad_phase/broad_phase_c.h"
 
-#include <cmath>
 #include <exception>
-#include <limits>
 #include <new>
 #include <span>
 #include <stdexcept>
@@ -32,13 +30,6 @@ template <class S>
 MatrixView<S> view(const kbvh_positions& positions) {
   return {static_cast<const S*>(positions.data), positions.rows, 3, positions.row_step,
           positions.column_step};
-}
-
-/// Returns the smallest S that is not less than x.
-template <class S>
-S rounded_up(double x) {
-  const S rounded = S(x);
-  return double(rounded) < x ? std::nextafter(rounded, std::numeric_limits<S>::infinity()) : rounded;
 }
 
 /// Calls work(broad phase, S()) and turns exceptions into an error text.
@@ -100,9 +91,9 @@ int kbvh_broad_phase_build(kbvh_broad_phase* handle, const kbvh_positions* v0, c
     const auto e = MatrixView<std::int32_t>::by_rows(edges, edge_count, 2);
     const auto f = MatrixView<std::int32_t>::by_rows(faces, face_count, 3);
     if (v1 == nullptr)
-      broad.build(view<S>(*v0), e, f, rounded_up<S>(radius));
+      broad.build(view<S>(*v0), e, f, radius);
     else
-      broad.build(view<S>(*v0), view<S>(*v1), e, f, rounded_up<S>(radius));
+      broad.build(view<S>(*v0), view<S>(*v1), e, f, radius);
   });
 }
 
@@ -125,8 +116,7 @@ int kbvh_broad_phase_update_moved(kbvh_broad_phase* handle, const kbvh_positions
 }
 
 int kbvh_broad_phase_valid_for(kbvh_broad_phase* handle, double displacement) {
-  return guarded(handle,
-                 [&]<class S>(BroadPhase<S>& broad, S) { broad.valid_for(rounded_up<S>(displacement)); });
+  return guarded(handle, [&](auto& broad, auto) { broad.valid_for(displacement); });
 }
 
 int kbvh_broad_phase_candidates(kbvh_broad_phase* handle, kbvh_candidate_kind kind, const uint32_t** pairs,
