@@ -87,6 +87,9 @@ class SegmentMotion : public SteppedMotion<S> {
   double lines_end(std::uint32_t body) const { return this->playback_->plans(body).lines_end(time()); }
   /// Returns whether the body rests until `lines_end`.
   bool at_rest(std::uint32_t body) const { return this->playback_->plans(body).at_rest(time()); }
+  /// Returns whether vertices of the body move on curves until `lines_end`: `piece` and `positions_on_lines`
+  /// are for lines.
+  bool on_curves(std::uint32_t body) const { return this->playback_->plans(body).curved_at(time()); }
   /// Returns the common translation of the body between `lines_begin` and `lines_end`; nothing if there is
   /// none (FlightPlans::translation).
   std::optional<Translation<S>> translation(std::uint32_t body) const {
