@@ -134,6 +134,13 @@ class FlightPlans {
   /// `speed_bound`.
   double displacement_bound(double t0, double t1) const;
 
+  /// Writes two points for each keyframed vertex, out[3 * vertex] and out[3 * (vertex_count + vertex)]: its
+  /// position at t, which is `begin` or `end`, moved down and up along every axis by as much as its curve may
+  /// lie below and above the chord between `begin` and `end`. Boxes around these points that are linear in
+  /// time contain the curves throughout, but for half a unit of rounding. Requires begin < end in one
+  /// segment. O(vertices).
+  void evaluate_hull(double begin, double end, double t, S* out) const;
+
   /// Throws std::invalid_argument if there is no such vertex.
   void check_vertex(std::uint32_t vertex) const;
   /// Throws the std::invalid_argument that `change` would throw.

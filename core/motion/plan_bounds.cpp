@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/motion/error_free.hpp"
 #include "core/motion/flight_plans.hpp"
@@ -161,6 +162,50 @@ double FlightPlans<S>::displacement_bound(double t0, double t1) const {
   return std::max(common, own_bound);
 }
 
+namespace {
+/// Returns value + move, rounded down or up to S.
+template <class S>
+S moved_down(S value, double move) {
+  const double exact = double(value) + move;  // off by less than one unit of double
+  return std::nextafter(S(exact), -std::numeric_limits<S>::infinity()) + S(0);
+}
+template <class S>
+S moved_up(S value, double move) {
+  return -moved_down(-value, -move) + S(0);
+}
+
+/// The bulge over a part of a segment, given by the shares of its ends: a curve lies below its chord by at
+/// most the largest second derivative times the square of the length over 8, and that derivative is linear.
+template <class S>
+Bulge<S> bulge_of_part(S bend, S twist, double from, double to) {
+  const double b = double(bend), w = double(twist), length = to - from;
+  const double first = 2 * (w - b) - 6 * w * from, last = 2 * (w - b) - 6 * w * to;
+  const double scale = 0.125 * length * length * (1 + 1e-12), rounding = (std::abs(b) + std::abs(w)) * 1e-14;
+  return {-(std::max({0.0, first, last}) + rounding) * scale,
+          (rounding - std::min({0.0, first, last})) * scale};
+}
+}  // namespace
+
+template <class S>
+void FlightPlans<S>::evaluate_hull(double begin, double end, double t, S* out) const {
+  const auto& times = keyframes_->times;
+  const std::size_t k = segment_at(begin), scalars = std::size_t(3) * keyframed_count_;
+  evaluate_keyframed(t, 0, keyframed_count_, out);
+  std::copy_n(out, scalars, out + scalars);
+  if (!curved_in(k)) return;
+  const S *const bend = bends(k), *const twist = twists(k);
+  const bool whole = begin == times[k] && end == times[k + 1];
+  const double duration = times[k + 1] - times[k], from = (begin - times[k]) / duration,
+               to = (end - times[k]) / duration;
+  for (std::size_t i = 0; i < scalars; ++i) {
+    const S w = twist == nullptr ? S(0) : twist[i];
+    if (bend[i] == S(0) && w == S(0)) continue;
+    const Bulge<S> distance = whole ? bulge(bend[i], w) : bulge_of_part(bend[i], w, from, to);
+    if (distance.lower != 0) out[i] = moved_down(out[i], distance.lower);
+    if (distance.upper != 0) out[scalars + i] = moved_up(out[scalars + i], distance.upper);
+  }
+}
+
 #define KBVH_INSTANTIATE(S)                                                                   \
   template std::optional<Translation<S>> FlightPlans<S>::translation(double) const;           \
   template std::optional<Translation<S>> FlightPlans<S>::find_translation(std::size_t) const; \
@@ -168,7 +213,8 @@ double FlightPlans<S>::displacement_bound(double t0, double t1) const {
   template double FlightPlans<S>::own_speed(const OwnPlan&, double) const;                    \
   template double FlightPlans<S>::own_speed_bound(double) const;                              \
   template double FlightPlans<S>::speed_bound(double) const;                                  \
-  template double FlightPlans<S>::displacement_bound(double, double) const;
+  template double FlightPlans<S>::displacement_bound(double, double) const;                   \
+  template void FlightPlans<S>::evaluate_hull(double, double, double, S*) const;
 KBVH_INSTANTIATE(float)
 KBVH_INSTANTIATE(double)
 #undef KBVH_INSTANTIATE

@@ -135,6 +135,49 @@ TEST(CurvedPlans, SpeedsAndDisplacementsAreBounded) {
   }
 }
 
+// Lines through the points of a hull, at both ends of a segment or of a part of it, enclose the curve.
+template <class S>
+void check_hulls(const std::string& name) {
+  const Scene<S> scene = curved_scene<S>(name).scene;
+  Random random(4);
+  for (const Body<S>& body : scene.bodies) {
+    const FlightPlans<S>& plans = body.plans;
+    const std::size_t n = std::size_t(3) * plans.vertex_count();
+    std::vector<S> first(2 * n), last(2 * n);
+    for (std::size_t k = 0; k + 1 < plans.keyframe_count(); ++k)
+      for (int round = 0; round < 3; ++round) {
+        const double t0 = plans.keyframe_times()[k], t1 = plans.keyframe_times()[k + 1];
+        double begin = t0, end = t1;
+        if (round > 0) begin = t0 + (t1 - t0) * (0.25 + 0.2 * random.unit());
+        if (round > 1) end = t1 - (t1 - t0) * (0.25 + 0.2 * random.unit());
+        if (!(t0 <= begin && begin < end && end <= t1)) continue;
+        plans.evaluate_hull(begin, end, begin, first.data());
+        plans.evaluate_hull(begin, end, end, last.data());
+        for (std::size_t i = 0; i < n; i += 1 + i % 7)
+          for (int step = 0; step <= 4; ++step) {
+            const Rational share(step, 4), t = Rational(begin) + (Rational(end) - Rational(begin)) * share;
+            const Rational x = rational_value(plans.curved_piece(std::uint32_t(i / 3), int(i % 3), k), t);
+            const auto line = [&](std::size_t at) {
+              return Rational(Rational(double(first[at])) * (1 - share) + Rational(double(last[at])) * share);
+            };
+            // Positions at the ends are rounded.
+            const double largest = std::max(std::abs(double(first[i])), std::abs(double(last[i])));
+            const Rational rounding(largest * double(std::numeric_limits<S>::epsilon()) +
+                                    double(std::numeric_limits<S>::denorm_min()));
+            EXPECT_LE(line(i), x + rounding) << name;
+            EXPECT_GE(line(n + i), x - rounding) << name;
+          }
+      }
+  }
+}
+
+TEST(CurvedPlans, HullsEncloseCurves) {
+  for (const std::string& name : curved_scene_names()) {
+    check_hulls<float>(name);
+    check_hulls<double>(name);
+  }
+}
+
 TEST(CurvedPlans, HashesTellCurvesApart) {
   const Scene<float> curved = curved_scene<float>("curved_gravity").scene,
                      lines = synthetic_scene<float>("sheets").scene;
