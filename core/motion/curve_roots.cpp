@@ -15,10 +15,10 @@ namespace kbvh {
 namespace {
 
 /// Covers underflow in sums of a few products.
-constexpr double kUnderflow = 0x1p-1000;
+constexpr double kLeast = 0x1p-1000;
 
 /// a - b, exact: g(s) = start (1 - s) + end s + s (1 - s) (bend + twist s).
-struct Difference {
+struct CurveDifference {
   DoubleDouble start, end, bend, twist;
 
   /// At least as large as any Bernstein coefficient, but for rounding.
@@ -28,7 +28,7 @@ struct Difference {
 };
 
 template <class S>
-Difference difference(const CurvedPiece<S>& a, const CurvedPiece<S>& b) {
+CurveDifference curve_difference(const CurvedPiece<S>& a, const CurvedPiece<S>& b) {
   const auto exact = [](S x, S y) { return two_diff(static_cast<double>(x), static_cast<double>(y)); };
   return {exact(a.x0, b.x0), exact(a.x1, b.x1), exact(a.bend, b.bend), exact(a.twist, b.twist)};
 }
@@ -48,9 +48,9 @@ struct Factor {
 /// Derives the factor. Every coefficient takes at most six operations on numbers of at most 2 `size`, each
 /// with a relative error of 2^-53, and leaves out lo parts of at most 2^-53 `size` in all: 16 * 2^-53 covers
 /// them.
-Factor factor(const Difference& g) {
+Factor factor(const CurveDifference& g) {
   const double start = g.start.hi, end = g.end.hi, bend = g.bend.hi, twist = g.twist.hi;
-  const double error = 0x1p-49 * g.size() + kUnderflow;
+  const double error = 0x1p-49 * g.size() + kLeast;
   const bool zero_start = is_zero(g.start), zero_end = is_zero(g.end);
   if (zero_start && zero_end) return {{bend, bend + twist}, 1, error};
   if (zero_start) return {{end + bend, end + 0.5 * (bend + twist), end}, 2, error};
@@ -295,7 +295,7 @@ bool same_numbers(DoubleDouble a, DoubleDouble b) {
   return a.hi == b.hi && a.lo == b.lo;
 }
 /// Returns whether two differences are equal up to their sign: they have the same roots.
-bool same_roots(const Difference& f, const Difference& g) {
+bool same_roots(const CurveDifference& f, const CurveDifference& g) {
   const auto negated = [](DoubleDouble x) { return DoubleDouble{-x.hi, -x.lo}; };
   if (same_numbers(f.start, g.start) && same_numbers(f.end, g.end) && same_numbers(f.bend, g.bend) &&
       same_numbers(f.twist, g.twist))
@@ -322,7 +322,7 @@ template <class S>
 SegmentRoots segment_roots(const CurvedPiece<S>& a, const CurvedPiece<S>& b, CurveStats* stats) {
   KBVH_ASSERT(one_segment(a, b));
   if (stats != nullptr) ++stats->searches;
-  const Difference g = difference(a, b);
+  const CurveDifference g = curve_difference(a, b);
   SegmentRoots found;
   if (g.size() == 0) {
     found.equal = true;
@@ -340,7 +340,7 @@ template <class S>
 TimeEstimate moment_estimate(const CurvedPiece<S>& piece, const CurveRoot& root) {
   const double duration = piece.t1 - piece.t0;
   const double time = piece.t0 + duration * (0.5 * (root.begin + root.end));
-  // Difference, sum, product and final sum each have at most one rounding error.
+  // CurveDifference, sum, product and final sum each have at most one rounding error.
   const double error = duration * (0.5 * (root.end - root.begin)) +
                        (std::fabs(piece.t0) + std::fabs(piece.t1) + duration) * 0x1p-51;
   return {std::clamp(time, piece.t0, piece.t1), error * (1 + 0x1p-40)};
@@ -349,13 +349,13 @@ TimeEstimate moment_estimate(const CurvedPiece<S>& piece, const CurveRoot& root)
 template <class S>
 int compare_at(const CurvedPiece<S>& a, const CurvedPiece<S>& b, double t) {
   KBVH_ASSERT(one_segment(a, b) && t >= a.t0 && t <= a.t1);
-  const Difference g = difference(a, b);
+  const CurveDifference g = curve_difference(a, b);
   if (t == a.t0) return sign_of(g.start.hi);
   if (t == a.t1) return sign_of(g.end.hi);
   const double s = (t - a.t0) / (a.t1 - a.t0), rest = 1 - s;
   const double value = g.start.hi * rest + g.end.hi * s + s * rest * (g.bend.hi + g.twist.hi * s);
   // s is off by 3 * 2^-53, and the derivative is at most 4 `size`.
-  if (std::fabs(value) > 0x1p-48 * g.size() + kUnderflow) return sign_of(value);
+  if (std::fabs(value) > 0x1p-48 * g.size() + kLeast) return sign_of(value);
   const DyadicTime time{Dyadic(t)};
   return Polynomial::from(in_time(exact_coefficients(a, b), a.t0, a.t1))
       .sign_at(time.numerator, time.exponent);
@@ -364,7 +364,7 @@ int compare_at(const CurvedPiece<S>& a, const CurvedPiece<S>& b, double t) {
 template <class S>
 int compare_moments(const CurveMoment<S>& x, const CurveMoment<S>& y) {
   if (one_segment(x.first, y.first)) {
-    if (same_roots(difference(x.first, x.second), difference(y.first, y.second)))
+    if (same_roots(curve_difference(x.first, x.second), curve_difference(y.first, y.second)))
       return (x.root > y.root) - (x.root < y.root);
     const SegmentRoots of_x = segment_roots(x.first, x.second), of_y = segment_roots(y.first, y.second);
     const CurveRoot &p = of_x.roots[x.root], &q = of_y.roots[y.root];
@@ -405,22 +405,21 @@ int compare_moment_to(const CurveMoment<S>& x, const Crossing<S>& crossing) {
 template <class S>
 int compare_at_moment(const CurvedPiece<S>& a, const CurvedPiece<S>& b, const CurveMoment<S>& moment) {
   KBVH_ASSERT(one_segment(a, b) && one_segment(a, moment.first));
-  const Difference g = difference(a, b);
-  if (g.size() == 0 || same_roots(g, difference(moment.first, moment.second))) return 0;
+  const CurveDifference g = curve_difference(a, b);
+  if (g.size() == 0 || same_roots(g, curve_difference(moment.first, moment.second))) return 0;
   const SegmentRoots known = segment_roots(moment.first, moment.second);
   const CurveRoot& root = known.roots[moment.root];
   const double s = 0.5 * (root.begin + root.end), rest = 1 - s;
   const double value = g.start.hi * rest + g.end.hi * s + s * rest * (g.bend.hi + g.twist.hi * s);
-  if (std::fabs(value) > (0x1p-48 + 4 * (root.end - root.begin)) * g.size() + kUnderflow)
-    return sign_of(value);
+  if (std::fabs(value) > (0x1p-48 + 4 * (root.end - root.begin)) * g.size() + kLeast) return sign_of(value);
   return in_share(moment).sign(Polynomial::from(exact_coefficients(a, b)));
 }
 
 template <class S>
 int compare_after_moment(const CurvedPiece<S>& a, const CurvedPiece<S>& b, const CurveMoment<S>& moment) {
   if (const int sign = compare_at_moment(a, b, moment)) return sign;
-  if (difference(a, b).size() == 0) return 0;
-  if (same_roots(difference(a, b), difference(moment.first, moment.second)))
+  if (curve_difference(a, b).size() == 0) return 0;
+  if (same_roots(curve_difference(a, b), curve_difference(moment.first, moment.second)))
     return segment_roots(a, b).roots[moment.root].after;
   return sign_after(Polynomial::from(exact_coefficients(a, b)), in_share(moment));
 }

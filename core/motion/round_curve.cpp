@@ -19,12 +19,12 @@ namespace {
 // third = s^2 (1 - s). The weights are the same for all values of a call.
 
 /// Product of two double-doubles, with a relative error below 2^-100.
-DoubleDouble times(DoubleDouble a, DoubleDouble b) {
+DoubleDouble multiplied(DoubleDouble a, DoubleDouble b) {
   const DoubleDouble head = two_product(a.hi, b.hi);
   return two_sum(head.hi, head.lo + (a.hi * b.lo + a.lo * b.hi));
 }
 
-bool usable(double x) {
+bool usable_part(double x) {
   return x == 0 || (std::fabs(x) >= 0x1p-250 && std::fabs(x) <= 0x1p250);
 }
 
@@ -32,7 +32,7 @@ struct Weights {
   DoubleDouble rest, share, both, third;  ///< each with a relative error below 2^-98
   bool in_range = false;                  ///< false: the times are so extreme that only integers are safe
   bool exact = false;                     ///< the hi parts are the exact weights
-  double t0, t1, t;
+  double t0 = 0, t1 = 0, t = 0;
 };
 
 Weights weights(double t0, double t1, double t) {
@@ -43,13 +43,13 @@ Weights weights(double t0, double t1, double t) {
   const int scale = -std::ilogb(duration.hi);
   for (DoubleDouble* x : {&elapsed, &left, &duration})
     *x = {std::ldexp(x->hi, scale), std::ldexp(x->lo, scale)};
-  w.in_range = usable(elapsed.hi) && usable(elapsed.lo) && usable(left.hi) && usable(left.lo) &&
-               usable(duration.lo) && elapsed.hi > 0 && left.hi > 0;
+  w.in_range = usable_part(elapsed.hi) && usable_part(elapsed.lo) && usable_part(left.hi) &&
+               usable_part(left.lo) && usable_part(duration.lo) && elapsed.hi > 0 && left.hi > 0;
   if (!w.in_range) return w;
   w.share = precise_quotient(elapsed, duration);
   w.rest = precise_quotient(left, duration);
-  w.both = times(w.share, w.rest);
-  w.third = times(w.share, w.both);
+  w.both = multiplied(w.share, w.rest);
+  w.third = multiplied(w.share, w.both);
   const DoubleDouble back = two_product(w.share.hi, duration.hi);
   const DoubleDouble both = two_product(w.share.hi, w.rest.hi), third = two_product(w.share.hi, both.hi);
   w.exact = elapsed.lo == 0 && duration.lo == 0 && back.hi == elapsed.hi && back.lo == 0 &&
@@ -66,7 +66,7 @@ struct Terms {
 
 /// The last stage: rounds the exact quotient.
 template <class S>
-S round_exactly(const Terms& v, const Weights& w) {
+S round_by_integers(const Terms& v, const Weights& w) {
   const Dyadic t0(w.t0), elapsed = Dyadic(w.t) - t0, duration = Dyadic(w.t1) - t0, left = duration - elapsed;
   const Dyadic square = duration * duration;
   const Dyadic chord = (Dyadic(v.x0) * left + Dyadic(v.x1) * elapsed) * square;
@@ -96,12 +96,12 @@ std::optional<S> round_by_expansion(const Terms& v, const Weights& w, S lower, S
 
 /// Rounds one value that the first stage left.
 template <class S>
-S round_one(const Terms& v, const Weights& w, RoundingStats& stats) {
+S round_hard(const Terms& v, const Weights& w, RoundingStats& stats) {
   ++stats.second_stage;
   if (v.bend == 0 && v.twist == 0 && v.x0 == v.x1) return static_cast<S>(v.x0) + S(0);
   if (w.in_range) {
-    const DoubleDouble a = times({v.x0, 0}, w.rest), b = times({v.x1, 0}, w.share),
-                       c = times({v.bend, 0}, w.both), d = times({v.twist, 0}, w.third);
+    const DoubleDouble a = multiplied({v.x0, 0}, w.rest), b = multiplied({v.x1, 0}, w.share),
+                       c = multiplied({v.bend, 0}, w.both), d = multiplied({v.twist, 0}, w.third);
     DoubleDouble sum = two_sum(a.hi, b.hi);
     double tail = sum.lo + (a.lo + b.lo);
     for (const DoubleDouble& term : {c, d}) {
@@ -136,7 +136,7 @@ S round_one(const Terms& v, const Weights& w, RoundingStats& stats) {
       if (const std::optional<S> rounded = round_by_expansion<S>(v, w, lower, upper)) return *rounded;
   }
   ++stats.exact;
-  return round_exactly<S>(v, w);
+  return round_by_integers<S>(v, w);
 }
 
 /// Rounds one value: the first stage, for floats, and what it leaves.
@@ -151,10 +151,9 @@ template <class S>
     const auto lower = static_cast<float>(value - error), upper = static_cast<float>(value + error);
     if (w.in_range && lower == upper) return lower + 0.0F;
   }
-  return round_one<S>(v, w, stats);
+  return round_hard<S>(v, w, stats);
 }
 
-template <class S>
 void check_times(double t0, double t1, double t) {
   const auto refuse = [&](const char* rule) {
     throw std::invalid_argument(std::string("position on a curve: ") + rule + ", but t0 = " +
@@ -176,7 +175,7 @@ Terms terms(const S* x0, const S* x1, const S* bend, const S* twist, std::size_t
 template <class S>
 void round_curve(const S* x0, const S* x1, const S* bend, const S* twist, std::size_t count, double t0,
                  double t1, double t, S* out, RoundingStats* stats) {
-  check_times<S>(t0, t1, t);
+  check_times(t0, t1, t);
   RoundingStats unused;
   RoundingStats& sums = stats != nullptr ? *stats : unused;
   sums.values += count;
@@ -193,7 +192,7 @@ template <class S>
 void round_curve_vertices(const S* x0, const S* x1, const S* bend, const S* twist,
                           const std::uint32_t* vertices, std::size_t count, double t0, double t1, double t,
                           S* out, RoundingStats* stats) {
-  check_times<S>(t0, t1, t);
+  check_times(t0, t1, t);
   RoundingStats unused;
   RoundingStats& sums = stats != nullptr ? *stats : unused;
   sums.values += 3 * count;

@@ -46,10 +46,10 @@ Body<S> renumbered(const Body<S>& body, std::vector<std::uint32_t> old_primitive
       positions.insert(positions.end(), body.plans.keyframe(k) + std::size_t(3) * v,
                        body.plans.keyframe(k) + std::size_t(3) * v + 3);
   std::vector<SegmentBends<S>> bends(body.plans.curved() ? times.size() - 1 : 0);
-  const auto reorder = [&](const S* values, std::vector<S>& result) {
+  const auto reorder = [&](const S* values, std::vector<S>& into) {
     for (std::size_t i = 0; values != nullptr && i < old_vertex.size(); ++i) {
       const S* const of_vertex = values + std::size_t(3) * old_vertex[i];
-      result.insert(result.end(), of_vertex, of_vertex + 3);
+      into.insert(into.end(), of_vertex, of_vertex + 3);
     }
   };
   for (std::size_t k = 0; k < bends.size(); ++k) {

@@ -135,22 +135,33 @@ int check_roots(const Pair<S>& pair, CurveStats& stats) {
   EXPECT_EQ(found.equal, p.empty()) << pair.text();
   EXPECT_EQ(back.count, found.count) << pair.text();
   if (p.empty()) return 0;
-  const std::vector<RationalRoot> roots = rational_roots(p, 70);
-  EXPECT_EQ(found.count, int(roots.size())) << pair.text();
-  if (found.count != int(roots.size())) return 0;
   const Sturm sturm(p);
+  const int at_start = value(p, 0).is_zero() ? 1 : 0, at_end = value(p, 1).is_zero() ? 1 : 0;
+  EXPECT_EQ(found.count, sturm.roots_in(0, 1) - at_end + at_start) << pair.text();
+  if (testing::Test::HasFailure()) return 0;
   for (int i = 0; i < found.count; ++i) {
     const CurveRoot& root = found.roots[i];
     const Rational begin(root.begin), end(root.end);
-    // The intervals overlap, and an isolated one contains this root alone.
-    EXPECT_TRUE(roots[std::size_t(i)].begin <= end && begin <= roots[std::size_t(i)].end) << pair.text();
-    if (root.isolated) {
-      EXPECT_EQ(sturm.roots_in(begin, end) + (value(p, begin).is_zero() ? 1 : 0),
-                1 + (begin != end && begin.is_zero() && value(p, begin).is_zero() ? 1 : 0))
-          << pair.text();
+    if (root.isolated && begin == end) {
+      EXPECT_TRUE(value(p, begin).is_zero()) << pair.text();
+      EXPECT_EQ(root.after, rational_sign_after(p, begin)) << pair.text();
+    } else if (root.isolated) {
+      // One root, not at an end: the sign there is that after the root. The start may be a root of its own.
+      EXPECT_EQ(sturm.roots_in(begin, end), 1) << pair.text();
+      EXPECT_EQ(root.after, value(p, end).sign()) << pair.text();
+      if (!begin.is_zero()) {
+        EXPECT_FALSE(value(p, begin).is_zero()) << pair.text();
+      }
+    } else {
+      const RationalRoot exact = rational_roots(p, 70)[std::size_t(i)];
+      EXPECT_TRUE(exact.begin <= end && begin <= exact.end) << pair.text();
+      EXPECT_EQ(root.after, rational_sign_after(p, exact.end)) << pair.text();
     }
-    EXPECT_EQ(root.after, rational_sign_after(p, roots[std::size_t(i)].end)) << pair.text();
+    if (i > 0) {
+      EXPECT_GE(root.begin, found.roots[i - 1].end - (root.isolated ? 0 : 1e-14)) << pair.text();
+    }
     EXPECT_EQ(back.roots[i].after, -root.after);
+    EXPECT_EQ(back.roots[i].begin, root.begin);
     const TimeEstimate estimate = moment_estimate(pair.a, root);
     for (const Rational& s : {begin, end})
       EXPECT_LE(abs(moved(s, pair.a.t0, pair.a.t1) - Rational(estimate.time)), Rational(estimate.error))
@@ -169,7 +180,6 @@ int rational_order(const RationalPolynomial& p, std::size_t i, double p0, double
     if (xe < yb) return -1;
     if (ye < xb) return 1;
     if (x.begin == x.end && y.begin == y.end) return xb < yb ? -1 : xb > yb ? 1 : 0;
-    if (bits <= 60) continue;
     // A common root: q in the share of p's segment.
     const Rational scale = (Rational(p1) - Rational(p0)) / (Rational(q1) - Rational(q0)),
                    shift = (Rational(p0) - Rational(q0)) / (Rational(q1) - Rational(q0));
@@ -187,9 +197,18 @@ int rational_order(const RationalPolynomial& p, std::size_t i, double p0, double
     trim(moved_q);
     const RationalPolynomial common = common_divisor(p, moved_q);
     if (common.size() < 2) continue;
-    const Rational low = x.begin, high = x.end;
-    const bool there = value(common, low).is_zero() || (low < high && Sturm(common).roots_in(low, high) > 0);
-    if (there && bits >= 480) return 0;
+    // Equal if both are roots of the common divisor, and it has one root where both are.
+    const auto in_share = [&](const Rational& t) {
+      return Rational((t - Rational(p0)) / (Rational(p1) - Rational(p0)));
+    };
+    const Sturm sturm(common);
+    const auto roots_in = [&](const Rational& begin, const Rational& end) {
+      return sturm.roots_in(begin, end) + (value(common, begin).is_zero() ? 1 : 0);
+    };
+    const Rational y_begin = in_share(yb), y_end = in_share(ye);
+    if (roots_in(x.begin, x.end) == 1 && roots_in(y_begin, y_end) == 1 &&
+        roots_in(std::min(x.begin, y_begin), std::max(x.end, y_end)) == 1)
+      return 0;
   }
 }
 
@@ -229,7 +248,7 @@ void check_random(int count, std::uint64_t seed) {
   EXPECT_GT(roots, count / 3);
   EXPECT_GT(several, count / 50);
   EXPECT_LT(stats.exact, stats.searches / 500) << "the filter decides nearly always";
-  RecordProperty("exact", int(stats.exact));
+  testing::Test::RecordProperty("exact", int(stats.exact));
 }
 
 TEST(CurveRoots, EqualRationalArithmeticOnRandomPairsOfFloats) {
@@ -255,8 +274,8 @@ void check_adversarial(int count, std::uint64_t seed) {
   EXPECT_GT(multiple, count / 20);
   EXPECT_GT(stats.exact, 0u);
   // Neighbours in the list have other numbers in the same places: 1/2, 1/3 and the like meet often.
-  for (std::size_t i = 0; i + 7 < moments.size() && !testing::Test::HasFailure(); ++i)
-    for (const std::size_t j : {i, i + 1, i + 4, i + 7}) check_order(moments[i], moments[j]);
+  for (std::size_t i = 0; i + 4 < moments.size() && !testing::Test::HasFailure(); ++i)
+    for (const std::size_t j : {i + 1, i + 4}) check_order(moments[i], moments[j]);
 }
 
 TEST(CurveRoots, EqualRationalArithmeticOnAdversarialPairsOfFloats) {
@@ -270,7 +289,7 @@ template <class S>
 void check_signs(std::uint64_t seed) {
   Pairs<S> pairs(seed);
   int zeros = 0;
-  for (int i = 0; i < 4000 && !testing::Test::HasFailure(); ++i) {
+  for (int i = 0; i < 1000 && !testing::Test::HasFailure(); ++i) {
     const Pair<S> pair = i % 2 == 0 ? pairs.random(i % 5) : pairs.adversarial(i % 10);
     Pair<S> other = i % 4 < 2 ? pairs.random(i % 5) : pair;
     for (CurvedPiece<S>* piece : {&other.a, &other.b}) piece->t0 = pair.a.t0, piece->t1 = pair.a.t1;
@@ -323,7 +342,7 @@ void check_signs(std::uint64_t seed) {
       }
     }
   }
-  EXPECT_GT(zeros, 500);
+  EXPECT_GT(zeros, 100);
 }
 
 TEST(CurveRoots, SignsAtAndAfterRootsAreExactInFloat) {
@@ -360,7 +379,7 @@ void check_positions(std::uint64_t seed) {
   Pairs<S> pairs(seed);
   RoundingStats stats;
   const double shares[] = {0, 1, 0.5, 0.25, 0.1, 1.0 / 3, 0.7, 1e-12, 1 - 1e-12};
-  for (int i = 0; i < 30000 && !testing::Test::HasFailure(); ++i) {
+  for (int i = 0; i < 10000 && !testing::Test::HasFailure(); ++i) {
     const CurvedPiece<S> piece = i % 3 == 0 ? pairs.adversarial(i % 10).a : pairs.random(i % 5).a;
     const double share =
         i % 2 == 0 ? shares[pairs.generator().below(9)] : 0.5 + 0.5 * pairs.generator().unit();
@@ -423,7 +442,9 @@ TEST(CurvedPiece, BulgeBoundsTheCurve) {
       least = std::min(least, above);
       most = std::max(most, above);
     }
-    if (piece.twist == 0.0F) EXPECT_NEAR(most - least, bound.upper - bound.lower, 1e-6);
+    if (piece.twist == 0.0F) {
+      EXPECT_NEAR(most - least, bound.upper - bound.lower, 1e-6);
+    }
   }
 }
 
