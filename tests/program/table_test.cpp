@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <optional>
 #include <sstream>
 
 #include "complaint.hpp"
@@ -130,6 +131,39 @@ TEST(Table, TheBestRefitIsThatOfTheAnalysis) {
   for (const auto& [l, records] : tables) {
     const json* found = best_refit(records);
     EXPECT_EQ(found == nullptr ? json() : found->at("strategy").at("id"), expected.at(l)) << "l = " << l;
+  }
+}
+
+/// Returns the numbers of a ratio, and whether its ends are those of an interval.
+json ratio_json(const std::optional<RatioOfTimes>& ratio) {
+  if (!ratio) return nullptr;
+  if (!ratio->within) return json::array({ratio->middle});
+  return {ratio->middle, ratio->within->low, ratio->within->high, ratio->within->is_interval};
+}
+
+// The program computes ratios and their intervals, so does the analysis (tests/analysis/test_ratios.py): by
+// frames and by clips, with paired rounds and with others, with few repetitions, with plan changes.
+TEST(Table, RatiosAreThoseOfTheAnalysis) {
+  const std::filesystem::path folder = std::filesystem::path(KBVH_PLANS) / "../../tests/support/results";
+  std::vector<json> records;
+  std::ifstream file(folder / "ratios.jsonl");
+  for (std::string line; std::getline(file, line);) records.push_back(json::parse(line));
+  const json* refit = best_refit(records);
+  ASSERT_NE(refit, nullptr);
+  json found;
+  for (const json& record : records)
+    for (const char* phase : {"total", "total_with_motion", "upkeep", "query"})
+      found[record.at("strategy").at("id").get<std::string>()][phase] =
+          ratio_json(ratio_of(*refit, phase, record, phase));
+  const json expected = json::parse(std::ifstream(folder / "ratios.json")).flatten();
+  const json flat = found.flatten();
+  ASSERT_EQ(flat.size(), expected.size()) << found.dump();
+  for (const auto& [path, value] : expected.items()) {
+    ASSERT_TRUE(flat.contains(path)) << path;
+    if (value.is_number())
+      EXPECT_NEAR(flat.at(path).get<double>() / value.get<double>(), 1, 1e-9) << path;
+    else
+      EXPECT_EQ(flat.at(path), value) << path;
   }
 }
 
