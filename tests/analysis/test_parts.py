@@ -29,28 +29,28 @@ class Parts(unittest.TestCase):
         self.program.write_text(PROGRAM)
         self.program.chmod(0o755)
 
-    def test(self, pattern: str = "*", frames: str = "1,7,20", shards: int = 1, index: int = 0, label: str = "unit") -> dict[str, Any]:
+    def part(self, pattern: str = "*", frames: str = "1,7,20", shards: int = 1, index: int = 0, label: str = "unit") -> dict[str, Any]:
         said = [f"GTEST_TOTAL_SHARDS={shards}", f"GTEST_SHARD_INDEX={index}", f"GTEST_FILTER={pattern}", f"KBVH_PER_KEYFRAME={frames}"]
         return {"command": [str(self.program)],
                 "properties": [{"name": "ENVIRONMENT", "value": said}, {"name": "LABELS", "value": [label]}]}  # fmt: skip
 
     def test_whole(self) -> None:
-        self.assertEqual(parts.faults([self.test()]), [])
-        self.assertEqual(parts.faults([self.test("one"), self.test("two", "1,7"), self.test("two", "20")]), [])
-        self.assertEqual(parts.faults([self.test(shards=2), self.test(shards=2, index=1)]), [])
+        self.assertEqual(parts.faults([self.part()]), [])
+        self.assertEqual(parts.faults([self.part("one"), self.part("two", "1,7"), self.part("two", "20")]), [])
+        self.assertEqual(parts.faults([self.part(shards=2), self.part(shards=2, index=1)]), [])
 
     def test_a_case_is_missing(self) -> None:
-        self.assertEqual(parts.faults([self.test("two")]), ["conformance_test: Other.Case is in no test"])
-        self.assertEqual(parts.faults([self.test("two"), self.test("one", label="sanitized")]),
+        self.assertEqual(parts.faults([self.part("two")]), ["conformance_test: Other.Case is in no test"])
+        self.assertEqual(parts.faults([self.part("two"), self.part("one", label="sanitized")]),
                          ["conformance_test: Other.Case is in no test"])  # fmt: skip
 
     def test_frames_are_missing(self) -> None:
         self.assertEqual(
-            parts.faults([self.test(frames="1,7")]),
+            parts.faults([self.part(frames="1,7")]),
             ["conformance_test: Registry/Conformance.Keeps/refit_on_sheet is not played with ['20'] frames a keyframe"])  # fmt: skip
 
     def test_a_shard_is_missing(self) -> None:
-        self.assertEqual(parts.faults([self.test(shards=2, index=1)]), ["conformance_test *: shards [1] of 2"])
+        self.assertEqual(parts.faults([self.part(shards=2, index=1)]), ["conformance_test *: shards [1] of 2"])
 
     def test_nothing_is_registered(self) -> None:
         self.assertEqual(parts.faults([]), ["no test is registered in parts"])
