@@ -23,10 +23,11 @@ inline Contestant contestant_of(const std::string& strategy, const std::map<std:
     if (key != "method" && key != "width" && key != "leaf_size")
       throw std::invalid_argument("a topology has the keys method, width and leaf_size, not '" + key + "'");
   const auto method = topology.find("method");
-  return {&entry, params,
-          suitable_builder(
-              entry.info, method == topology.end() ? std::nullopt : std::optional(build_method(method->second)),
-              number_of(topology, "width"), number_of(topology, "leaf_size"))};
+  return {
+      &entry, params,
+      suitable_builder(entry.info,
+                       method == topology.end() ? std::nullopt : std::optional(build_method(method->second)),
+                       number_of(topology, "width"), number_of(topology, "leaf_size"))};
 }
 
 /// What a world of one scalar holds: the added bodies, the scene as it is played, and its session.

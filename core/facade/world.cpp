@@ -290,8 +290,7 @@ std::vector<WorldCounter> World::counters() const {
     std::uint64_t& fetched = table[Counter::positions_fetched];
     fetched -= std::min(fetched, world.fetched_for_questions);
     std::vector<WorldCounter> out;
-    for (std::size_t c = 0; c < table.values.size(); ++c)
-      out.push_back({name(Counter(c)), table.values[c]});
+    for (std::size_t c = 0; c < table.values.size(); ++c) out.push_back({name(Counter(c)), table.values[c]});
     for (const Counters::Named& counter : table.named)
       out.push_back({std::string(counter.name), counter.value});
     return out;
@@ -323,8 +322,7 @@ bool World::audit(std::uint32_t body, WorldAudit& out) {
     out = {};
     const auto view = world.session().strategy().audit_view(body);
     if (!view) return false;
-    out =
-        plain(kbvh::audit(*view, world.session().scene().bodies[body].primitives, world.fetched(body)));
+    out = plain(kbvh::audit(*view, world.session().scene().bodies[body].primitives, world.fetched(body)));
     return true;
   });
 }

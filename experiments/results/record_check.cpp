@@ -24,7 +24,8 @@ struct Field {
   Needed needed = Needed::always;
 };
 
-/// What tables, targets and merges read of a record. A field of a part that is not there is not needed either.
+/// What tables, targets and merges read of a record. A field of a part that is not there is not needed
+/// either.
 constexpr Field fields[] = {
     {"run", Kind::text, Needed::if_there},
     {"choice", Kind::text, Needed::if_there},

@@ -9,8 +9,8 @@
 
 #include "core/base/counters.hpp"
 #include "experiments/common/text.hpp"
-#include "experiments/study/times_record.hpp"
 #include "experiments/results/table.hpp"
+#include "experiments/study/times_record.hpp"
 
 namespace kbvh::experiments {
 

@@ -41,22 +41,21 @@ TEST(Table, RatiosAreAgainstTheBestRefit) {
   const std::vector<json> records{example_record("slow", "refit", 8), example_record("fast", "refit", 4),
                                   example_record("own", "kinetic", 2), broken};
   EXPECT_EQ(best_refit(records), &records[1]);
-  EXPECT_EQ(
-      results_table(records),
-      "s, l = 10, float: 5 frames, 7 primitives, 3 repetitions\n"
-      "strategy  x refit       range  update  query  motion  extra   family\n"
-      "own             2      2 to 2       4      0       1      1  kinetic\n"
-      "fast            1           -       8      0       1      1    refit\n"
-      "slow          0.5  0.5 to 0.5      16      0       1      1    refit\n"
-      "wrong     refused                                         1    refit\n"
-      "\n"
-      "strategy  with motion  paid from  missed  extra  protrusion  looseness  code\n"
-      "own               1.8          -       0      1           0       0.25     -\n"
-      "fast                1          -       0      1           0       0.25     -\n"
-      "slow            0.529          -       0      1           0       0.25     -\n"
-      "wrong                                  0      1           0       0.25     -\n"
-      "  x refit: against fast, the baseline with the shortest clip\n"
-      "  wrong is refused a time: it is wrong\n");
+  EXPECT_EQ(results_table(records),
+            "s, l = 10, float: 5 frames, 7 primitives, 3 repetitions\n"
+            "strategy  x refit       range  update  query  motion  extra   family\n"
+            "own             2      2 to 2       4      0       1      1  kinetic\n"
+            "fast            1           -       8      0       1      1    refit\n"
+            "slow          0.5  0.5 to 0.5      16      0       1      1    refit\n"
+            "wrong     refused                                         1    refit\n"
+            "\n"
+            "strategy  with motion  paid from  missed  extra  protrusion  looseness  code\n"
+            "own               1.8          -       0      1           0       0.25     -\n"
+            "fast                1          -       0      1           0       0.25     -\n"
+            "slow            0.529          -       0      1           0       0.25     -\n"
+            "wrong                                  0      1           0       0.25     -\n"
+            "  x refit: against fast, the baseline with the shortest clip\n"
+            "  wrong is refused a time: it is wrong\n");
 }
 
 TEST(Table, SaysHowManyPairsThereAre) {
@@ -89,7 +88,6 @@ TEST(Table, DisturbedRatiosLookDifferent) {
       << table;
 }
 
-
 // A refit of one's own is shown in the table, and no ratio is against it unless it is declared a baseline.
 TEST(Table, OnlyDeclaredBaselinesAreTheDenominator) {
   std::vector<json> records{example_record("mine", "refit", 1), example_record("bottom_up", "refit", 4),
@@ -98,8 +96,7 @@ TEST(Table, OnlyDeclaredBaselinesAreTheDenominator) {
   records[1]["strategy"]["baseline"] = true;
   records[2]["strategy"]["baseline"] = false;
   EXPECT_EQ(best_refit(records), &records[1]);
-  EXPECT_NE(results_table(records).find("\nmine             4  4 to 4"),
-            std::string::npos)
+  EXPECT_NE(results_table(records).find("\nmine             4  4 to 4"), std::string::npos)
       << results_table(records);
   records[2]["strategy"]["baseline"] = true;
   EXPECT_EQ(best_refit(records), &records[2]);
@@ -216,10 +213,14 @@ TEST(Table, TextIsBrokenBetweenWords) {
 std::vector<json> many_records() {
   std::vector<json> records;
   for (int i = 0; i < 20; ++i) {
-    const std::string family = i % 4 == 0 ? "refit" : i % 4 == 1 ? "kinetic" : i % 4 == 2 ? "rebuild" : "peer";
+    const std::string family = i % 4 == 0   ? "refit"
+                               : i % 4 == 1 ? "kinetic"
+                               : i % 4 == 2 ? "rebuild"
+                                            : "peer";
     records.push_back(example_record("own_" + std::to_string(i), family, 20 - i));
     records.back()["strategy"]["label"] =
-        "own_" + std::to_string(i) + " (queue avl, candidates searched, planes start, boxes inherited, width 2)";
+        "own_" + std::to_string(i) +
+        " (queue avl, candidates searched, planes start, boxes inherited, width 2)";
   }
   records.push_back(example_record("guess", "peer", 0.5));
   records.back()["strategy"]["guarantee"] = "approximate";
@@ -230,7 +231,8 @@ std::vector<json> many_records() {
 TEST(Table, OfManyTheFastestOfEachFamilyIsShown) {
   const std::vector<json> records = many_records();
   const std::string table = results_table(records, Shown::fastest);
-  // The refit is the best one, and its family's fastest; the approximate contestant does not hide an exact one.
+  // The refit is the best one, and its family's fastest; the approximate contestant does not hide an exact
+  // one.
   std::vector<std::string> shown;
   std::istringstream lines(table);
   for (std::string line; std::getline(lines, line);)
@@ -259,9 +261,11 @@ TEST(Table, NoLineIsLongerThanAPage) {
   for (std::size_t i = 0; i < records.size(); ++i) {
     json& record = records[i];
     record["times"]["disturbed"] = i % 2 == 0 ? "9 involuntary switches, 30 a second" : "";
-    record["strategy"].update({{"version", "Peer 3.2.1"}, {"remark", "what it does in its update, it does late"}});
+    record["strategy"].update(
+        {{"version", "Peer 3.2.1"}, {"remark", "what it does in its update, it does late"}});
     record["verified"].update({{"frames", 5u}, {"pairs", 123456789u}});
-    record["choice"] = "another one in 17 of 591 frames, because the motion of its bodies is not what it was before";
+    record["choice"] =
+        "another one in 17 of 591 frames, because the motion of its bodies is not what it was before";
   }
   for (const Shown shown : {Shown::fastest, Shown::all}) {
     const std::string table = results_table(records, shown);
