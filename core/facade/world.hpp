@@ -12,7 +12,7 @@
 namespace kbvh {
 
 namespace detail {
-class WorldImplementation;
+struct WorldImplementation;
 }
 
 /// The scalar of a world's positions and boxes.
@@ -367,6 +367,12 @@ class World {
   static std::vector<std::pair<std::string, std::string>> counter_meanings();
 
  private:
+  /// Calls work(world of this precision).
+  template <class Work>
+  decltype(auto) in_scalar(const Work& work);
+  template <class Work>
+  decltype(auto) in_scalar(const Work& work) const;
+
   std::unique_ptr<detail::WorldImplementation> implementation_;
 };
 

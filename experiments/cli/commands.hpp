@@ -38,7 +38,7 @@ struct StudyOptions {
   std::vector<std::uint64_t> triangles, seeds, l, widths, leaf_sizes;
   std::uint64_t obstacle = 0, keyframes = 0, repetitions = 0, frames_limit = 0, oracle_every = 0;
   double interval_width = -1, seconds = -1;  ///< negative: not given
-  bool print_plan = false, list_jobs = false, self = false, continuous = false;
+  bool print_plan = false, list_jobs = false, self = false, continuous = false, names = false;
 };
 
 /// Keeps only the studies of a plan file whose name is among `names` (a study without a name has the plan's),

@@ -28,7 +28,7 @@ curves=smooth (all; cubics through the keyframes instead of lines); `kbvh list` 
 whatever their first corner; from then on a polygon is the union of these triangles.
 A clip is timed from its first frame on: positions, the strategy's reset and its first answer count. Every contestant
 is verified, replayed, and then played in rounds, each in an order of its own, until the intervals of all ratios are
-narrow enough or the time is used up. RESULTS.md explains the table.
+narrow enough or the time is used up. The fastest stand first; --names shows all. RESULTS.md explains the table.
 Exit codes: 0 all guarantees hold, 1 one is broken, 2 wrong use or input, 3 other error.)";
 
 /// Converts parameters to the form of a plan: "key=a,b" becomes {"key": ["a", "b"]}.
@@ -127,12 +127,19 @@ int run_study(const StudyOptions& options) {
     return success;
   }
   if (!options.job.empty()) plan = plan_of_job(plan, options.job);
-  const StudyOutcome outcome = run_plan(plan, options.out, options.job);
+  const StudyOutcome outcome =
+      run_plan(plan, options.out, options.job, options.names ? Shown::all : Shown::fastest);
   if (!options.out.empty())
     say(counted(outcome.measured, "configuration") + " measured, " + std::to_string(outcome.skipped) +
         (outcome.skipped == 1 ? " was in " : " were in ") +
         (std::filesystem::path(options.out) / (options.job.empty() ? "results.jsonl" : "jobs")).string() +
         " already");
+  if (outcome.timed > 0)
+    say(outcome.disturbed == 0
+            ? "the machine was quiet: none of " + counted(outcome.timed, "timed configuration") +
+                  " was disturbed"
+            : std::to_string(outcome.disturbed) + " of " + counted(outcome.timed, "timed configuration") +
+                  (outcome.disturbed == 1 ? " was" : " were") + " disturbed by other work (? in the tables)");
   if (outcome.unfinished > 0)
     say(counted(outcome.unfinished, "configuration") + " without enough memory; the next run measures " +
         (outcome.unfinished == 1 ? "it" : "them") + " again");
@@ -213,6 +220,10 @@ void add_study(CLI::App& command, const std::shared_ptr<StudyOptions>& o) {
             "run only the studies of this name, without the plan's targets; repeatable")
       ->needs(plan);
   command.add_flag("--print-plan", o->print_plan, "print the equivalent plan file, and stop");
+  command.add_flag(
+      "--names", o->names,
+      "show every contestant of a table by name, with all columns; otherwise, of more than twelve, the "
+      "fastest of each family");
   for (CLI::Option* option : said_by_plan) plan->excludes(option);
 }
 

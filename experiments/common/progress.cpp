@@ -1,5 +1,6 @@
 #include "experiments/common/progress.hpp"
 
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <cstdio>
@@ -19,7 +20,10 @@ void Progress::show(const std::string& line) {
   current_activity = line;
   if (!terminal_) return;
   shown_ = true;
-  std::fprintf(stderr, "\r\x1b[K%.110s", line.c_str());
+  winsize window{};
+  const int width =
+      ::ioctl(STDERR_FILENO, TIOCGWINSZ, &window) == 0 && window.ws_col > 1 ? window.ws_col - 1 : 99;
+  std::fprintf(stderr, "\r\x1b[K%.*s", width, line.c_str());
   std::fflush(stderr);
 }
 

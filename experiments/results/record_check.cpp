@@ -1,5 +1,7 @@
+#include <algorithm>
 #include <cmath>
-#include <optional>
+#include <string>
+#include <string_view>
 
 #include "experiments/results/record.hpp"
 
@@ -9,190 +11,176 @@ using nlohmann::json;
 
 namespace {
 
-enum class Kind : std::uint8_t { text, whole, number, truth, object, list };
-
-const char* kind_name(Kind kind) {
-  switch (kind) {
-    case Kind::text:
-      return "a text";
-    case Kind::whole:
-      return "a whole number";
-    case Kind::number:
-      return "a finite number that is not negative";
-    case Kind::truth:
-      return "true or false";
-    case Kind::object:
-      return "an object";
-    case Kind::list:
-      break;
-  }
-  return "a list";
-}
-
-bool is(const json& value, Kind kind) {
-  switch (kind) {
-    case Kind::text:
-      return value.is_string();
-    case Kind::whole:
-      return value.is_number_unsigned();
-    case Kind::number:
-      return value.is_number() && std::isfinite(value.get<double>()) && value.get<double>() >= 0;
-    case Kind::truth:
-      return value.is_boolean();
-    case Kind::object:
-      return value.is_object();
-    case Kind::list:
-      break;
-  }
-  return value.is_array();
-}
-
-struct Field {
-  const char* name;
-  Kind kind;
+enum class Kind : std::uint8_t { text, whole, size, number, truth, object, object_or_null, list };
+enum class Needed : std::uint8_t {
+  always,
+  if_there,  ///< older records lack it, or the study did not ask for it
+  steady,    ///< if the clip has steady frames
 };
 
-/// Returns the first field that is missing or of another type.
-std::string wrong(const json& object, const std::string& place, std::initializer_list<Field> fields) {
-  for (const Field& field : fields) {
-    const auto found = object.find(field.name);
-    if (found == object.end()) return "the field " + place + field.name + " is missing";
-    if (!is(*found, field.kind)) return place + field.name + " is not " + kind_name(field.kind);
+struct Field {
+  std::string_view path;  ///< "[]" after a list: in or of each of its entries
+  Kind kind;
+  Needed needed = Needed::always;
+};
+
+/// What tables, targets and merges read of a record. A field of a part that is not there is not needed
+/// either.
+constexpr Field fields[] = {
+    {"run", Kind::text, Needed::if_there},
+    {"choice", Kind::text, Needed::if_there},
+    {"refused", Kind::text, Needed::if_there},
+    {"machine", Kind::object, Needed::if_there},
+    {"machine.kernels", Kind::text, Needed::if_there},
+    {"changes", Kind::object, Needed::if_there},
+    {"changes.begun", Kind::whole},
+    {"changes.ended", Kind::whole},
+    {"scene", Kind::object},
+    {"scene.name", Kind::text},
+    {"scene.scalar", Kind::text},
+    {"scene.per_keyframe", Kind::whole},
+    {"scene.frames", Kind::whole},
+    {"scene.primitives", Kind::whole},
+    {"scene.bodies", Kind::list},
+    {"scene.bodies[]", Kind::object},
+    {"scene.bodies[].moving", Kind::truth},
+    {"scene.bodies[].primitives", Kind::whole},
+    {"scene.bodies[].kind", Kind::text},
+    {"scene.continuous", Kind::truth, Needed::if_there},
+    {"scene.changes", Kind::text, Needed::if_there},
+    {"scene.rays", Kind::text, Needed::if_there},
+    {"scene.kernels", Kind::text, Needed::if_there},
+    {"scene.script", Kind::object, Needed::if_there},
+    {"scene.script.steps", Kind::whole},
+    {"scene.script.changes", Kind::whole},
+    {"strategy", Kind::object},
+    {"strategy.id", Kind::text},
+    {"strategy.label", Kind::text},
+    {"strategy.family", Kind::text},
+    {"strategy.baseline", Kind::truth, Needed::if_there},
+    {"strategy.guarantee", Kind::text, Needed::if_there},
+    {"strategy.version", Kind::text, Needed::if_there},
+    {"strategy.instructions", Kind::text, Needed::if_there},
+    {"strategy.remark", Kind::text, Needed::if_there},
+    {"strategy.params", Kind::object},
+    {"strategy.params.kernels", Kind::text, Needed::if_there},
+    {"verified", Kind::object},
+    {"verified.holds", Kind::truth},
+    {"verified.missed", Kind::whole},
+    {"verified.extra", Kind::whole},
+    {"verified.audited", Kind::truth},
+    {"verified.protrusion", Kind::size},
+    {"verified.looseness", Kind::number},  // may be negative: boxes without content have no area
+    {"times", Kind::object_or_null},
+    {"times.by", Kind::text},
+    {"times.disturbed", Kind::text},
+    {"times.build_ms", Kind::size},
+    {"times.repetitions", Kind::list},
+    {"times.repetitions[]", Kind::object},
+    {"times.repetitions[].motion", Kind::size},
+    {"times.repetitions[].update", Kind::size},
+    {"times.repetitions[].traversal", Kind::size},
+    {"times.repetitions[].triangle_tests", Kind::size},
+    {"times.repetitions[].plan_changes", Kind::size},
+    {"times.repetitions[].geometry_changes", Kind::size, Needed::if_there},
+    {"times.repetitions[].totals", Kind::list},
+    {"times.repetitions[].totals[]", Kind::size},
+    {"times.repetitions[].motions", Kind::list},
+    {"times.repetitions[].motions[]", Kind::size},
+    {"times.repetitions[].steady", Kind::object, Needed::steady},
+    {"times.repetitions[].steady.motion", Kind::size, Needed::steady},
+    {"times.repetitions[].steady.update", Kind::size, Needed::steady},
+    {"times.repetitions[].steady.traversal", Kind::size, Needed::steady},
+    {"times.repetitions[].steady.triangle_tests", Kind::size, Needed::steady},
+    {"times.repetitions[].steady.plan_changes", Kind::size, Needed::steady},
+    {"times.repetitions[].steady.geometry_changes", Kind::size, Needed::steady},
+};
+
+/// Returns "" for a value of this kind, else what it is not.
+std::string is_not(const json& value, Kind kind) {
+  switch (kind) {
+    case Kind::text:
+      return value.is_string() ? "" : "is not a text";
+    case Kind::whole:
+      return value.is_number_unsigned() ? "" : "is not a whole number";
+    case Kind::size:
+      return value.is_number() && std::isfinite(value.get<double>()) && value.get<double>() >= 0
+                 ? ""
+                 : "is not a finite number that is not negative";
+    case Kind::number:
+      return value.is_number() ? "" : "is not a number";
+    case Kind::truth:
+      return value.is_boolean() ? "" : "is not true or false";
+    case Kind::object:
+      return value.is_object() ? "" : "is not an object";
+    case Kind::object_or_null:
+      return value.is_object() || value.is_null() ? "" : "is neither an object nor null";
+    case Kind::list:
+      break;
+  }
+  return value.is_array() ? "" : "is not a list";
+}
+
+/// Returns a field's path for messages.
+std::string place_of(const Field& field) {
+  std::string place(field.path);
+  for (std::size_t at; (at = place.find("[]")) != std::string::npos;) place.erase(at, 2);
+  return place;
+}
+
+/// Returns what is wrong with a field below `part`, from character `begin` of its path on. Parts of another
+/// kind are not looked into: a field of their own tells.
+std::string wrong(const json& part, const Field& field, std::size_t begin = 0) {
+  if (!part.is_object()) return {};
+  const std::size_t end = std::min(field.path.find('.', begin), field.path.size());
+  const bool last = end == field.path.size();
+  std::string name(field.path.substr(begin, end - begin));
+  const bool each = name.ends_with("[]");
+  if (each) name.resize(name.size() - 2);
+  const auto found = part.find(name);
+  if (found == part.end())
+    return !last || each || field.needed == Needed::if_there ? ""
+                                                             : "the field " + place_of(field) + " is missing";
+  if (!each) {
+    if (!last) return wrong(*found, field, end + 1);
+    const std::string what = is_not(*found, field.kind);
+    return what.empty() ? "" : place_of(field) + " " + what;
+  }
+  if (!found->is_array()) return {};
+  for (const json& entry : *found) {
+    std::string what = last ? is_not(entry, field.kind) : wrong(entry, field, end + 1);
+    if (!what.empty()) return last ? place_of(field) + " has an entry that " + what : what;
   }
   return {};
 }
 
-/// Returns the first field of another type; fields that older records lack may be missing.
-std::string wrong_if_there(const json& object, const std::string& place,
-                           std::initializer_list<Field> fields) {
-  for (const Field& field : fields)
-    if (object.contains(field.name))
-      if (std::string what = wrong(object, place, {field}); !what.empty()) return what;
-  return {};
-}
-
-std::string wrong_scene(const json& scene) {
-  std::string what = wrong(scene, "scene.",
-                           {{"name", Kind::text},
-                            {"scalar", Kind::text},
-                            {"per_keyframe", Kind::whole},
-                            {"frames", Kind::whole},
-                            {"primitives", Kind::whole},
-                            {"bodies", Kind::list}});
-  if (!what.empty()) return what;
-  for (const json& body : scene.at("bodies")) {
-    if (!body.is_object()) return "scene.bodies is not a list of objects";
-    what = wrong(body, "scene.bodies.",
-                 {{"moving", Kind::truth}, {"primitives", Kind::whole}, {"kind", Kind::text}});
-    if (!what.empty()) return what;
-  }
-  if (scene.contains("continuous") && !scene.at("continuous").is_boolean())
-    return "scene.continuous is not true or false";
-  if (scene.contains("changes") && !scene.at("changes").is_string()) return "scene.changes is not a text";
-  what = wrong_if_there(scene, "scene.", {{"rays", Kind::text}, {"kernels", Kind::text}});
-  if (!what.empty()) return what;
-  if (!scene.contains("script")) return {};
-  if (!scene.at("script").is_object()) return "scene.script is not an object";
-  return wrong(scene.at("script"), "scene.script.", {{"steps", Kind::whole}, {"changes", Kind::whole}});
-}
-
-/// Checks the times of single frames, and the means of the steady ones.
-std::string wrong_frames(const json& times, const json& repetition) {
-  const std::size_t frames = times.at("repetitions")[0].value("totals", json::array()).size();
-  for (const char* name : {"totals", "motions"}) {
-    if (std::string what = wrong(repetition, "times.repetitions.", {{name, Kind::list}}); !what.empty())
-      return what;
-    const json& list = repetition.at(name);
-    if (list.empty() || list.size() != frames)
-      return std::string("times.repetitions.") + name + " has not as many entries as there are frames";
-    for (const json& value : list)
-      if (!is(value, Kind::number))
-        return std::string("times.repetitions.") + name + " has an entry that is not " +
-               kind_name(Kind::number);
-  }
-  for (const char* text : {"by", "disturbed"})
-    if (std::string what = wrong(times, "times.", {{text, Kind::text}}); !what.empty()) return what;
-  if (std::string what = wrong(times, "times.", {{"build_ms", Kind::number}}); !what.empty()) return what;
-  const auto steady = times.find("steady_from");
-  if (steady == times.end() || steady->is_null()) return {};
-  if (!is(*steady, Kind::whole) || steady->get<std::uint64_t>() >= frames)
+/// Checks that there are times of as many frames in every repetition, and where the steady ones begin.
+std::string wrong_frames(const json& times) {
+  const json& repetitions = times.at("repetitions");
+  if (repetitions.empty()) return "times.repetitions has no entry";
+  const std::size_t frames = repetitions[0].at("totals").size();
+  for (const json& repetition : repetitions)
+    for (const char* name : {"totals", "motions"})
+      if (frames == 0 || repetition.at(name).size() != frames)
+        return std::string("times.repetitions.") + name + " has not as many entries as there are frames";
+  const json steady = times.value("steady_from", json());
+  if (!steady.is_null() && (!steady.is_number_unsigned() || steady.get<std::uint64_t>() >= frames))
     return "times.steady_from is not a frame";
-  if (std::string what = wrong(repetition, "times.repetitions.", {{"steady", Kind::object}}); !what.empty())
-    return what;
-  return wrong(repetition.at("steady"), "times.repetitions.steady.",
-               {{"motion", Kind::number},
-                {"update", Kind::number},
-                {"traversal", Kind::number},
-                {"triangle_tests", Kind::number},
-                {"plan_changes", Kind::number},
-                {"geometry_changes", Kind::number}});
-}
-
-std::string wrong_times(const json& times) {
-  if (times.is_null()) return {};
-  if (!times.is_object()) return "times is neither an object nor null";
-  if (std::string what = wrong(times, "times.", {{"repetitions", Kind::list}}); !what.empty()) return what;
-  if (times.at("repetitions").empty()) return "times.repetitions has no entry";
-  for (const json& repetition : times.at("repetitions")) {
-    if (!repetition.is_object()) return "times.repetitions is not a list of objects";
-    std::string what = wrong(repetition, "times.repetitions.",
-                             {{"motion", Kind::number},
-                              {"update", Kind::number},
-                              {"traversal", Kind::number},
-                              {"triangle_tests", Kind::number},
-                              {"plan_changes", Kind::number}});
-    if (what.empty() && repetition.contains("geometry_changes"))
-      what = wrong(repetition, "times.repetitions.", {{"geometry_changes", Kind::number}});
-    if (what.empty()) what = wrong_frames(times, repetition);
-    if (!what.empty()) return what;
-  }
   return {};
 }
 
 }  // namespace
 
 std::string unusable(const json& record) {
-  std::string what =
-      wrong(record, "", {{"scene", Kind::object}, {"strategy", Kind::object}, {"verified", Kind::object}});
-  if (what.empty()) what = wrong_scene(record.at("scene"));
-  if (what.empty())
-    what =
-        wrong(record.at("strategy"), "strategy.",
-              {{"id", Kind::text}, {"label", Kind::text}, {"family", Kind::text}, {"params", Kind::object}});
-  if (what.empty())
-    what = wrong_if_there(record.at("strategy"), "strategy.",
-                          {{"guarantee", Kind::text},
-                           {"version", Kind::text},
-                           {"instructions", Kind::text},
-                           {"remark", Kind::text}});
-  if (what.empty())
-    what = wrong_if_there(record.at("strategy").at("params"), "strategy.params.", {{"kernels", Kind::text}});
-  if (what.empty()) what = wrong_if_there(record, "", {{"machine", Kind::object}});
-  if (what.empty() && record.contains("machine"))
-    what = wrong_if_there(record.at("machine"), "machine.", {{"kernels", Kind::text}});
-  // Records from before baselines were declared have no such field.
-  if (what.empty() && !record.at("strategy").value("baseline", json(false)).is_boolean())
-    what = "strategy.baseline is not true or false";
-  if (what.empty())
-    what = wrong(record.at("verified"), "verified.",
-                 {{"holds", Kind::truth},
-                  {"missed", Kind::whole},
-                  {"extra", Kind::whole},
-                  {"audited", Kind::truth},
-                  {"protrusion", Kind::number}});
-  // Looseness may be negative: boxes without content have no area.
-  if (what.empty() &&
-      (!record.at("verified").contains("looseness") || !record.at("verified").at("looseness").is_number()))
-    what = "the field verified.looseness is missing or not a number";
-  if (what.empty() && !record.contains("times")) what = "the field times is missing";
-  if (what.empty()) what = wrong_times(record.at("times"));
-  if (what.empty() && record.contains("changes"))
-    what = !record.at("changes").is_object()
-               ? "changes is not an object"
-               : wrong(record.at("changes"), "changes.", {{"begun", Kind::whole}, {"ended", Kind::whole}});
-  for (const char* text : {"choice", "refused", "run"})
-    if (what.empty() && record.contains(text)) what = wrong(record, "", {{text, Kind::text}});
-  return what;
+  if (!record.is_object()) return "the record is not an object";
+  const auto times = record.find("times");
+  const bool steady =
+      times != record.end() && times->is_object() && !times->value("steady_from", json()).is_null();
+  for (const Field& field : fields) {
+    if (field.needed == Needed::steady && !steady) continue;
+    if (std::string what = wrong(record, field); !what.empty()) return what;
+  }
+  return times->is_null() ? "" : wrong_frames(*times);
 }
 
 }  // namespace kbvh::experiments

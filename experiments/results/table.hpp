@@ -1,4 +1,5 @@
 #pragma once
+#include <cstdint>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -8,8 +9,16 @@
 
 namespace kbvh::experiments {
 
+/// What a person reads without scrolling sideways: no line of a table is longer.
+constexpr std::size_t longest_line = 100;
+
 /// Lays out cells in columns: the first column to the left, the others to the right. `rows[0]` is the head.
-std::string columns(const std::vector<std::vector<std::string>>& rows);
+/// Where lines would be longer than `longest`, long first cells have lines of their own.
+std::string columns(const std::vector<std::vector<std::string>>& rows, std::size_t longest = SIZE_MAX);
+
+/// Breaks a text into lines between words; all begin with `indent`, those after the first two blanks further
+/// in.
+std::string wrapped(const std::string& text, const std::string& indent, std::size_t longest = longest_line);
 
 /// Returns whether the contestant was timed, or refused a time.
 bool has_times(const nlohmann::json& record);
@@ -47,11 +56,18 @@ const nlohmann::json* best_refit(const std::vector<nlohmann::json>& records);
 /// or of the kernels in use; "-" in records that do not tell.
 std::string instructions_of(const nlohmann::json& record);
 
-/// Formats the table of records of one scene, l and scalar: times in ms per frame, the instruction set, speed
-/// relative to the best refit (above 1 is faster) without and with motion evaluation, and of the steady
-/// frames; the frame from which a contestant has paid for preparation and beginning; and the results of the
-/// verification. Ratios with "?" are disturbed; lines below say why, or that the machine was quiet, and name
-/// versions of peers.
-std::string results_table(const std::vector<nlohmann::json>& records);
+/// Which contestants a table shows.
+enum class Shown : std::uint8_t {
+  fastest,  ///< of many, the best refit and the fastest of each family; of a few, all
+  all,      ///< all, with a second table of what else is known about them
+};
+
+/// Formats the table of records of one scene, l and scalar, the fastest first: speed relative to the best
+/// refit (above 1 is faster) with its interval, times in ms per frame, and what the verification found if it
+/// found something. Ratios with "?" are disturbed; a line below says how many, or that the machine was quiet.
+/// The second table of `Shown::all` has the instruction set, the ratio with motion evaluation and of the
+/// steady frames, the frame from which a contestant has paid for preparation and beginning, and the
+/// verification.
+std::string results_table(const std::vector<nlohmann::json>& records, Shown shown = Shown::all);
 
 }  // namespace kbvh::experiments

@@ -13,15 +13,16 @@
 #include "experiments/common/machine.hpp"
 #include "experiments/common/output.hpp"
 #include "experiments/common/progress.hpp"
+#include "experiments/common/stopwatch.hpp"
 #include "experiments/common/text.hpp"
 #include "experiments/io/bytes.hpp"
 #include "experiments/results/record.hpp"
 #include "experiments/results/results.hpp"
-#include "experiments/results/table.hpp"
 #include "experiments/results/target_rows.hpp"
 #include "experiments/run/in_progress.hpp"
 #include "experiments/run/rounds.hpp"
 #include "experiments/run/scene_pictures.hpp"
+#include "experiments/run/time_left.hpp"
 #include "experiments/study/contact_measurement.hpp"
 #include "experiments/study/ray_measurement.hpp"
 #include "experiments/study/targets.hpp"
@@ -65,10 +66,13 @@ std::unique_ptr<ResultStore> opened(const std::filesystem::path& out, const std:
 /// One run of a plan: the state shared by all its groups.
 class Runner {
  public:
-  Runner(const Plan& plan, const std::filesystem::path& out, const std::string& job)
+  Runner(const Plan& plan, const std::filesystem::path& out, const std::string& job, Shown shown,
+         TimeLeft left)
       : plan_{{"name", plan.name}, {"description", plan.description}},
         machine_(machine()),
-        run_(invocation(job)) {
+        run_(invocation(job)),
+        shown_(shown),
+        left_(std::move(left)) {
     if (!out.empty()) store_ = opened(out, job, run_);
     in_progress_.emplace(out.empty() || job.empty() ? out : out / "jobs" / job);
     for (const std::string& doing : in_progress_->killed())
@@ -100,6 +104,7 @@ class Runner {
         use_kernel_set(*study.kernels);
       } catch (const std::invalid_argument& problem) {
         note("note: the study '" + study.name + "' is skipped: " + problem.what());
+        for (std::size_t i = 0; i < study.scenes.size(); ++i) left_.begin_scene();
         return;
       }
       machine_["kernels"] = name(*study.kernels);
@@ -137,6 +142,7 @@ class Runner {
  private:
   void scenes(const Study& study, const std::vector<ContestantSpec>& contestants) {
     for (const SceneSpec& spec : study.scenes) {
+      left_.begin_scene();
       if (spec.optional) {
         if (const std::string missing = missing_file(spec); !missing.empty()) {
           note("note: the scene '" + spec.name + "' is skipped: there is no " + missing);
@@ -158,6 +164,8 @@ class Runner {
       }
     }
   }
+
+  void show(const std::string& doing) { progress_.show(left_.said() + doing); }
 
   void note(const std::string& text) {
     progress_.clear();
@@ -314,8 +322,8 @@ class Runner {
       else
         of_this_run_.insert_or_assign(record.at("key").get<std::string>(), record);
     };
-    for (std::size_t c = 0; c < contestants.size(); ++c) {
-      const ContestantSpec& spec = contestants[c];
+    left_.begin_table(contestants.size() * (verification_steps + study.repetitions));
+    for (const ContestantSpec& spec : contestants) {
       if (const std::string why = why_not(spec.entry->info); !why.empty()) {
         note("note: " + spec.entry->info.id + " is left out of " + about_scene.at("name").get<std::string>() +
              ": it " + why);
@@ -352,15 +360,17 @@ class Runner {
         in_progress_->settle(key);
         continue;
       }
-      progress_.show(title + ": verifying " + spec.label);
+      show(title + ": verifying " + spec.label);
       in_progress_->begin(key, "verifying " + spec.label + " on " + title + ", " + scalar);
       measurement.add(spec, study.oracle_every);
+      left_.made(verification_steps);
     }
     if (skipped > 0)
       note(title + ", " + scalar + ": " + std::to_string(skipped) + " of " +
            counted(records.size(), "configuration") + " in the results already, not measured again");
     play_rounds(measurement, study, seed, [&](std::size_t i, std::uint32_t round) {
-      progress_.show(title + ": round " + std::to_string(round + 1) + ", " + measurement[i].spec->label);
+      left_.made(1);
+      show(title + ": round " + std::to_string(round + 1) + ", " + measurement[i].spec->label);
       in_progress_->begin(records[record_of[i]]["key"],
                           "timing " + measurement[i].spec->label + " on " + title + ", " + scalar);
     });
@@ -370,7 +380,12 @@ class Runner {
     outcome_.skipped += skipped;
     groups_.push_back({about_scene, records});
     progress_.clear();
-    print(results_table(records) + "\n");
+    for (const json& record : records) {
+      if (!has_times(record) || !record.at("times").contains("disturbed")) continue;
+      ++outcome_.timed;
+      if (!disturbed(record).empty()) ++outcome_.disturbed;
+    }
+    print(results_table(records, shown_) + "\n");
     if (!failed.empty()) throw io::InputError(failed);
   }
 
@@ -421,6 +436,8 @@ class Runner {
   json plan_;  // its name and description
   json machine_;
   std::string run_;
+  Shown shown_;
+  TimeLeft left_;
   std::unique_ptr<ResultStore> store_;
   std::map<std::string, json> of_this_run_;  // by key, where there is no store
   std::string card_;                         // of the current scene
@@ -437,7 +454,8 @@ class Runner {
 
 }  // namespace
 
-StudyOutcome run_plan(const Plan& plan, const std::filesystem::path& out, const std::string& job) {
+StudyOutcome run_plan(const Plan& plan, const std::filesystem::path& out, const std::string& job,
+                      Shown shown) {
   // All errors of the contestants are found before the first measurement.
   std::vector<std::vector<ContestantSpec>> contestants;
   std::vector<std::string> notes;
@@ -445,7 +463,10 @@ StudyOutcome run_plan(const Plan& plan, const std::filesystem::path& out, const 
     contestants.push_back(expand(study.strategies, study.params, study.builder, notes));
   check_target_contestants(plan, contestants);
   for (const std::string& text : std::set<std::string>(notes.begin(), notes.end())) say("note: " + text);
-  Runner runner(plan, out, job);
+  std::vector<std::size_t> sizes;
+  for (const auto& list : contestants) sizes.push_back(list.size());
+  const auto now = [begin = std::chrono::steady_clock::now()] { return seconds_since(begin); };
+  Runner runner(plan, out, job, shown, TimeLeft(plan, sizes, now));
   for (std::size_t i = 0; i < plan.studies.size(); ++i) runner.study(plan.studies[i], contestants[i]);
   runner.targets(plan);
   if (!job.empty()) runner.write_keys(out / "jobs" / job / "keys");

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <string>
 
+#include "experiments/results/table.hpp"
 #include "experiments/study/plan.hpp"
 
 namespace kbvh::experiments {
@@ -11,6 +12,8 @@ namespace kbvh::experiments {
 struct StudyOutcome {
   std::size_t measured = 0;    ///< configurations
   std::size_t skipped = 0;     ///< already in the results
+  std::size_t timed = 0;       ///< configurations with times, now or before
+  std::size_t disturbed = 0;   ///< of these
   std::size_t refused = 0;     ///< without a time, because a guarantee was broken (also in earlier runs)
   std::size_t unfinished = 0;  ///< without a time, because memory ran out; the next run measures them again
 };
@@ -23,6 +26,8 @@ struct StudyOutcome {
 /// and `out`/targets.json written. With `job`, the id of the job whose plan this is (jobs.hpp), the records
 /// go to a new file in `out`/jobs/ID; records in `out`/results.jsonl and of earlier attempts are known, too.
 /// Throws io::InputError and ConfigError.
-StudyOutcome run_plan(const Plan& plan, const std::filesystem::path& out, const std::string& job = {});
+/// `shown`: which contestants the tables show.
+StudyOutcome run_plan(const Plan& plan, const std::filesystem::path& out, const std::string& job = {},
+                      Shown shown = Shown::fastest);
 
 }  // namespace kbvh::experiments

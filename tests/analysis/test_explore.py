@@ -178,6 +178,26 @@ class TestProgram(Folder):
         expected = json.loads((results / "denominators.json").read_text())
         self.assertEqual(found, [expected] * 3)
 
+    def test_ratios_are_those_of_the_program_on_the_same_file(self) -> None:
+        # tests/program/table_test.cpp and test_ratios.py read the same two files. Times in the page have fewer digits.
+        results = Path(__file__).resolve().parents[1] / "support" / "results"
+        shutil.copy(results / "ratios.jsonl", self.folder / "results.jsonl")
+        found = self.answer("""
+            import { compare, model } from "SRC/model.js";
+            const made = model(data);
+            const refit = made.runs.find((run) => run.contestant.id === "refit");
+            const numbers = ({ middle, low, high, isInterval }) => [middle, low, high, isInterval];
+            const of = (run) => ["without_motion", "with_motion", "update", "query"].map((scope) => numbers(compare(made, run, refit, scope)));
+            console.log(JSON.stringify(Object.fromEntries(made.runs.map((run) => [run.contestant.id, of(run)]))));""")
+        expected = json.loads((results / "ratios.json").read_text())
+        self.assertEqual(set(found), set(expected))
+        for id, phases in expected.items():
+            for phase, wanted, got in zip(phases, phases.values(), found[id]):
+                with self.subTest(id, phase=phase):
+                    for one, other in zip(got[:3], wanted[:3] if len(wanted) > 1 else wanted * 3):
+                        self.assertAlmostEqual(one / other, 1, delta=2e-3)
+                    self.assertEqual(got[3], len(wanted) > 1 and wanted[3])
+
 
 class TestPage(Folder):
     def test_text_of_results_cannot_end_the_data(self) -> None:

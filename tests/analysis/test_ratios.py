@@ -132,6 +132,29 @@ class TestOneDenominator(unittest.TestCase):
             found[float(group["l"].iloc[0])] = None if best is None else ids[best]
         self.assertEqual(found, expected)
 
+    def test_ratios_are_those_of_the_program_on_the_same_file(self) -> None:
+        # tests/program/table_test.cpp reads the same two files. The program computes; this holds the analysis to it.
+        results = Path(__file__).resolve().parents[1] / "support" / "results"
+        expected = json.loads((results / "ratios.json").read_text())
+        with tempfile.TemporaryDirectory(prefix="kbvh-analysis-") as folder:
+            shutil.copy(results / "ratios.jsonl", Path(folder) / "results.jsonl")
+            study = load.load(Path(folder))
+        ids = study.runs.set_index("run")["id"]
+        refit = ratios.best_refit(study, study.runs)
+        self.assertIsNotNone(refit)
+        scopes = {"total": "without_motion", "total_with_motion": "with_motion", "upkeep": "update", "query": "query"}
+        self.assertEqual(set(ids), set(expected))
+        for run, id in ids.items():
+            for phase, scope in scopes.items():
+                with self.subTest(id, phase=phase):
+                    one, wanted = ratios.ratio(study, int(run), refit, scope), expected[id][phase]
+                    found = None if one is None else [one.middle, one.low, one.high]
+                    if found is None or wanted is None:
+                        self.assertEqual(found, wanted)
+                        continue
+                    np.testing.assert_allclose(found, wanted[:3] if len(wanted) > 1 else wanted * 3, rtol=1e-9)
+                    self.assertEqual(one.is_interval, len(wanted) > 1 and wanted[3])
+
 
 def clip(strategy: str, family: str, frames: list[list[float]], **times: Any) -> dict[str, Any]:
     """A result of schema 2 with these totals, [repetition][frame], update and query alike, and 1 ms of motion."""

@@ -50,7 +50,8 @@ class Presets(unittest.TestCase):
                 chain.append(presets[name])
                 name = presets[name].get("inherits")
             values = {key: value for one in reversed(chain) for key, value in one.get("cacheVariables", {}).items()}
-            self.assertNotEqual(values.get("KBVH_KERNELS_HERE", "OFF"), "ON", chain[0]["name"])
+            # Said, so that it comes back after experiments/reproduce has built for its machine alone.
+            self.assertEqual(values["KBVH_KERNELS_HERE"], "OFF", chain[0]["name"])
             self.assertEqual(values["CMAKE_BUILD_TYPE"], "Release")
 
 
@@ -58,14 +59,14 @@ class Pieces(unittest.TestCase):
     def test_help_names_every_option(self) -> None:
         code, said, _ = run(REPRODUCE, "--help")
         self.assertEqual(code, 0)
-        for option in ("--out", "--plan", "--paper", "--study", "--pieces", "report.html"):
+        for option in ("--out", "--plan", "--full", "--paper", "--study", "--pieces", "report.html"):
             self.assertIn(option, said)
         self.assertNotIn("set -e", said)
 
     def test_pieces_are_listed(self) -> None:
         code, said, _ = run(REPRODUCE, "--pieces")
         self.assertEqual(code, 0)
-        self.assertIn("tablecloth, 2k triangles about     1 min\n", said)
+        self.assertIn("tablecloth               about     1 min\n", said)
         self.assertEqual(said, run(sys.executable, COST, "experiments/plans/default.json")[1])
 
     def test_a_plan_is_relative_to_the_folder_of_the_caller(self) -> None:
@@ -80,7 +81,7 @@ class Pieces(unittest.TestCase):
         plan = "experiments/plans/default.json"
         code, said, complaint = run(sys.executable, COST, plan, "--study", "tablecloth, 3k triangles")
         self.assertEqual((code, said), (2, ""))
-        self.assertIn("no study 'tablecloth, 3k triangles'; it has 'tablecloth, 2k triangles', ", complaint)
+        self.assertIn("no study 'tablecloth, 3k triangles'; it has 'tablecloth', ", complaint)
         code, said, complaint = run(sys.executable, COST, "no/plan.json")
         self.assertEqual((code, said), (2, ""))
         self.assertEqual(complaint, "plan_cost: no/plan.json: No such file or directory\n")

@@ -17,6 +17,7 @@ SOUND = {
     "tests/hash/compare": "echo equal hashes",
     "tests/fuzz/run": "true",
     "tests/skipped.py": "true",
+    "tests/suites.py": 'echo "tested $*" >> calls',
     "bin/cmake": 'mkdir -p build/dev build/sanitized; [[ $* != *--build* ]] || echo "built $*" >> calls',
     "bin/ctest": 'echo "tested $*" >> calls',
     "bin/git": "true",
@@ -31,7 +32,7 @@ class Run(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.root = Path(folder.name)
 
-    def play(self, **programs: str) -> "subprocess.CompletedProcess[str]":
+    def play(self, *options: str, **programs: str) -> "subprocess.CompletedProcess[str]":
         for name, code in {**SOUND, **{name.replace("__", "-"): code for name, code in programs.items()}}.items():
             file = self.root / next((known for known in SOUND if known.endswith("/" + name)), name)
             file.parent.mkdir(parents=True, exist_ok=True)
@@ -39,7 +40,7 @@ class Run(unittest.TestCase):
             file.chmod(0o755)
         shutil.copy(paths.HERE.parents[1] / "tests" / "run", self.root / "tests" / "run")
         environment = {**os.environ, "PATH": f"{self.root / 'bin'}:{os.environ['PATH']}"}
-        return subprocess.run([self.root / "tests" / "run"], capture_output=True, text=True, env=environment, timeout=90)
+        return subprocess.run([self.root / "tests" / "run", *options], capture_output=True, text=True, env=environment, timeout=90)
 
     def calls(self) -> str:
         file = self.root / "calls"
@@ -57,10 +58,23 @@ class Run(unittest.TestCase):
     def test_all_is_done(self) -> None:
         run = self.play()
         self.assertEqual(run.returncode, 0, run.stderr)
+        self.assertEqual(self.calls(), "built --build --preset dev\ntested build/dev -LE slow|sanitized|deep\n")
+        self.assertIn("Format: correct.", run.stdout)
+
+    def test_the_rest_is_done(self) -> None:
+        run = self.play("--deep")
+        self.assertEqual(run.returncode, 0, run.stderr)
         self.assertEqual(self.calls().count("built"), 2)
-        self.assertEqual(self.calls().count("tested"), 2)
-        for said in ("the lab", "equal hashes", "Format: correct."):
+        for said in ("build/sanitized --output-on-failure -j 2 -L sanitized\n", "build/dev --output-on-failure -j 4 -L deep\n"):
+            self.assertIn("tested --test-dir " + said, self.calls())
+        for said in ("the lab", "equal hashes"):
             self.assertIn(said, run.stdout)
+
+    def test_a_suite_or_the_format_that_fails_is_told(self) -> None:
+        self.assertEqual(self.play(**{"suites.py": "exit 3"}).returncode, 3)
+        run = self.play(**{"clang__format": "echo wrong; exit 1"})
+        self.assertEqual(run.returncode, 1)
+        self.assertIn("tests/run: format failed\n", run.stderr)
 
     def test_packages_that_cannot_be_installed_end_the_build(self) -> None:
         run = self.play(setup='[[ $* == --compile ]] && exit 0; sleep 1; echo "E: dpkg was interrupted"; exit 100', cmake=f"mkdir -p build; [[ $* != *--build* ]] || {{ {LONG}; }}")
@@ -75,7 +89,14 @@ class Run(unittest.TestCase):
         self.assertEqual(self.calls().count("built"), 1)
 
     def test_a_failure_beside_ends_the_sanitized_build(self) -> None:
-        run = self.play(lab='sleep 1; echo "no engine"; exit 1', cmake=f"mkdir -p build; [[ $* != *--build*sanitized* ]] || {{ {LONG}; }}")
+        run = self.play("--deep", setup='[[ $* == --tests ]] && exit 0; sleep 1; echo "no emscripten"; exit 1',
+                        cmake=f"mkdir -p build; [[ $* != *--build*sanitized* ]] || {{ {LONG}; }}")
+        self.assertEqual(run.returncode, 1, run.stderr)
+        self.assertIn("no emscripten\ntests/run: setup failed\n", run.stderr)
+        self.stopped()
+
+    def test_a_failure_beside_ends_the_sanitized_tests(self) -> None:
+        run = self.play("--deep", lab='sleep 1; echo "no engine"; exit 1', ctest=LONG)
         self.assertEqual(run.returncode, 1, run.stderr)
         self.assertIn("no engine\ntests/run: lab failed\n", run.stderr)
         self.stopped()

@@ -13,7 +13,8 @@
 
 namespace kbvh::test {
 
-/// Returns whether scenes are played in float and in double; `tests/run --quick` plays most in one of them.
+/// Returns whether scenes are played in float and in double; KBVH_ONE_SCALAR=1 has most played in one of
+/// them.
 inline bool in_both_scalars() {
   return std::getenv("KBVH_ONE_SCALAR") == nullptr;
 }

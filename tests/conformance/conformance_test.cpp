@@ -8,6 +8,8 @@
 #include <limits>
 #include <map>
 #include <set>
+#include <sstream>
+#include <stdexcept>
 
 #include "core/base/library_gaps.hpp"
 #include "core/kernels/kernel_set.hpp"
@@ -46,6 +48,21 @@ bool is_turn_of_float(const std::string& scene, std::uint32_t l) {
   return (place % 2 == 0) == (l != 7);
 }
 
+/// Returns how many frames a keyframe interval has in each play: what the environment lists in
+/// KBVH_PER_KEYFRAME, so that the parts of tests/run divide the plays among them; otherwise all, many for the
+/// slow tests alone.
+std::vector<std::uint32_t> frames_per_keyframe() {
+  if (const char* list = std::getenv("KBVH_PER_KEYFRAME")) {
+    std::vector<std::uint32_t> chosen;
+    std::istringstream words(list);
+    for (std::string word; std::getline(words, word, ',');) chosen.push_back(std::uint32_t(std::stoul(word)));
+    if (chosen.empty()) throw std::invalid_argument("KBVH_PER_KEYFRAME is empty");
+    return chosen;
+  }
+  if (std::getenv("KBVH_SLOW") != nullptr) return {1, 7, 20, 100};
+  return {1, 7, 20};
+}
+
 /// Scene, strategy.
 class Conformance : public testing::TestWithParam<std::pair<std::string, std::string>> {};
 
@@ -53,12 +70,7 @@ TEST_P(Conformance, KeepsItsGuaranteeOnEveryFrame) {
   const auto& [scene_name, id] = GetParam();
   const StrategyEntry& entry = find_strategy(id);
   const BuilderConfig builder = entry.info.topology.preferred;
-  // The slow tests play every scene with many frames. Sanitizers take their time.
-  const std::uint32_t most = std::getenv("KBVH_FEW_FRAMES") != nullptr ? 7
-                             : std::getenv("KBVH_SLOW") != nullptr     ? 100
-                                                                       : 20;
-  for (std::uint32_t l : {1u, 7u, 20u, 100u}) {
-    if (l > most) continue;
+  for (const std::uint32_t l : frames_per_keyframe()) {
     const std::string where = id + " on " + scene_name + ", l = " + std::to_string(l);
     const bool float_alone = is_turn_of_float(scene_name, l);
     if (in_both_scalars() || float_alone)

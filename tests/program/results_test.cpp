@@ -1,9 +1,7 @@
-// Result files, keys, times and tables.
+// Result files, keys and times.
 #include <gtest/gtest.h>
 
 #include <filesystem>
-#include <fstream>
-#include <map>
 #include <set>
 
 #include "complaint.hpp"
@@ -129,7 +127,7 @@ TEST(Results, KeysAreStableAndSeeWhatMatters) {
     EXPECT_NE(configuration_key("abc", example_scene(), example_strategy(), other, example_machine), usual);
 }
 
-// --- times and tables ---------------------------------------------------------------------------------
+// --- times -------------------------------------------------------------------------------------------
 
 TEST(Times, QuantilesAreOfTheMedianRepetition) {
   Measured measured;
@@ -303,77 +301,6 @@ TEST(Times, ABeginningIsPaidForFromAFrameOn) {
   EXPECT_EQ(paid_from(b, 0, b, 0), std::optional<std::size_t>(0));
 }
 
-json example_record(const std::string& id, const std::string& family, double update) {
-  json repetitions = json::array();
-  for (const double factor : {1.0, 3.0, 2.0})
-    repetitions.push_back({{"motion", 1.0},
-                           {"update", factor * update},
-                           {"traversal", 0.0},
-                           {"triangle_tests", 0.0},
-                           {"plan_changes", 0.0}});
-  return {
-      {"run", "r"},
-      {"scene", {{"name", "s"}, {"per_keyframe", 10}, {"scalar", "float"}, {"frames", 5}, {"primitives", 7}}},
-      {"strategy", {{"id", id}, {"label", id}, {"family", family}}},
-      {"verified",
-       {{"missed", 0}, {"extra", 1}, {"audited", true}, {"protrusion", 0.0}, {"looseness", 0.25}}},
-      {"times", {{"repetitions", repetitions}}}};
-}
-
-TEST(Table, RatiosAreAgainstTheBestRefit) {
-  json broken = example_record("wrong", "refit", 0.01);
-  broken["times"] = nullptr;
-  broken["refused"] = "it is wrong";
-  const std::vector<json> records{example_record("slow", "refit", 8), example_record("fast", "refit", 4),
-                                  example_record("own", "kinetic", 2), broken};
-  EXPECT_EQ(best_refit(records), &records[1]);
-  EXPECT_EQ(
-      results_table(records),
-      "s, l = 10, float: 5 frames, 7 primitives, 3 repetitions\n"
-      "strategy   motion  update  query  code  x refit       range  with motion  paid from  missed  extra  "
-      "protrusion  looseness\n"
-      "slow            1      16      0     -      0.5  0.5 to 0.5        0.529          -       0      1  "
-      "         0       0.25\n"
-      "fast            1       8      0     -        1           -            1          -       0      1  "
-      "         0       0.25\n"
-      "own             1       4      0     -        2      2 to 2          1.8          -       0      1  "
-      "         0       0.25\n"
-      "wrong     refused                                                                         0      1  "
-      "         0       0.25\n"
-      "  x refit and with motion: against fast, the baseline with the shortest clip\n"
-      "  wrong is refused a time: it is wrong\n");
-}
-
-TEST(Table, SaysHowManyPairsThereAre) {
-  std::vector<json> records{example_record("threw", "refit", 1), example_record("fast", "refit", 4)};
-  records[0]["verified"].update({{"frames", 1u}, {"pairs", 2u}});
-  records[1]["verified"].update({{"frames", 4u}, {"pairs", 35u}});
-  const auto title = [&] { return results_table(records).substr(0, results_table(records).find('\n')); };
-  EXPECT_EQ(title(),
-            "s, l = 10, float: 5 frames, 7 primitives, 3 repetitions, 35 true pairs in 4 compared frames");
-  records[1]["verified"].update({{"frames", 1u}, {"pairs", 1u}});
-  records[0]["verified"]["pairs"] = 1u;
-  EXPECT_EQ(title(),
-            "s, l = 10, float: 5 frames, 7 primitives, 3 repetitions, 1 true pair in 1 compared frame");
-  for (json& record : records) record["scene"]["rays"] = "coherent:4:closest";
-  EXPECT_EQ(title(),
-            "s, l = 10, float: 5 frames, 7 primitives, 3 repetitions, 1 true hit in 1 compared frame");
-  for (json& record : records) record["verified"]["frames"] = "damaged";
-  EXPECT_EQ(title(), "s, l = 10, float: 5 frames, 7 primitives, 3 repetitions");
-}
-
-TEST(Table, DisturbedRatiosLookDifferent) {
-  std::vector<json> records{example_record("refit", "refit", 4), example_record("own", "kinetic", 2)};
-  for (json& record : records) record["times"]["disturbed"] = "";
-  EXPECT_NE(results_table(records).find("\n  quiet\n"), std::string::npos) << results_table(records);
-  records[1]["times"]["disturbed"] = "9 involuntary switches, 30 a second";
-  const std::string table = results_table(records);
-  EXPECT_EQ(table.find("quiet"), std::string::npos) << table;
-  EXPECT_NE(table.find("       2?"), std::string::npos) << table;
-  EXPECT_NE(table.find("\n  ? disturbed: own: 9 involuntary switches, 30 a second\n"), std::string::npos)
-      << table;
-}
-
 TEST(Effort, SaysWhyTimesAreDisturbed) {
   Effort effort{.wall = 1, .processor = 0.999, .thread = 0.999};
   EXPECT_EQ(disturbance(effort), "");
@@ -385,76 +312,6 @@ TEST(Effort, SaysWhyTimesAreDisturbed) {
   EXPECT_EQ(disturbance(effort), "") << "several threads wait for each other";
   effort.steal = 0.02;
   EXPECT_EQ(disturbance(effort), "a hypervisor withheld processors for 20 ms");
-}
-
-// A user's own refit is shown in the table, but no ratio refers to it unless it is declared a baseline.
-TEST(Table, OnlyDeclaredBaselinesAreTheDenominator) {
-  std::vector<json> records{example_record("mine", "refit", 1), example_record("bottom_up", "refit", 4),
-                            example_record("new", "other", 2)};
-  records[0]["strategy"]["baseline"] = false;
-  records[1]["strategy"]["baseline"] = true;
-  records[2]["strategy"]["baseline"] = false;
-  EXPECT_EQ(best_refit(records), &records[1]);
-  EXPECT_NE(results_table(records).find("\nmine            1       2      0     -        4"),
-            std::string::npos)
-      << results_table(records);
-  records[2]["strategy"]["baseline"] = true;
-  EXPECT_EQ(best_refit(records), &records[2]);
-}
-
-// One denominator for all phases: a baseline that works in the query, or fetches its positions, does not
-// become the denominator of updates alone.
-TEST(Table, TheBestRefitHasTheShortestClip) {
-  std::vector<json> records{example_record("lazy", "refit", 1), example_record("plain", "refit", 4)};
-  for (json& repetition : records[0]["times"]["repetitions"])
-    repetition.update({{"motion", 0.0}, {"traversal", 9.0}});
-  EXPECT_EQ(best_refit(records), &records[1]) << "its update is longer, its clip is shorter";
-  for (json& repetition : records[0]["times"]["repetitions"]) repetition["traversal"] = 6.5;
-  EXPECT_EQ(best_refit(records), &records[0]) << "2 + 6.5 is longer than 8, by less than its positions";
-}
-
-// The program, the analysis and the explorer choose the same denominator from the same file;
-// tests/analysis/test_ratios.py and test_explore.py check the other two.
-TEST(Table, TheBestRefitIsThatOfTheAnalysis) {
-  const std::filesystem::path folder = std::filesystem::path(KBVH_PLANS) / "../../tests/support/results";
-  std::map<std::string, std::vector<json>> tables;
-  std::ifstream file(folder / "denominators.jsonl");
-  for (std::string line; std::getline(file, line);) {
-    json record = json::parse(line);
-    tables[std::to_string(record.at("scene").at("per_keyframe").get<int>())].push_back(std::move(record));
-  }
-  const json expected = json::parse(std::ifstream(folder / "denominators.json"));
-  ASSERT_EQ(tables.size(), expected.size());
-  for (const auto& [l, records] : tables) {
-    const json* found = best_refit(records);
-    EXPECT_EQ(found == nullptr ? json() : found->at("strategy").at("id"), expected.at(l)) << "l = " << l;
-  }
-}
-
-TEST(Table, CodeAndVersionsOfPeersAreShown) {
-  std::vector<json> records{example_record("bottom_up", "refit", 4), example_record("bottom_up", "refit", 4),
-                            example_record("peer", "embree", 8)};
-  for (json& record : records) record["machine"] = {{"kernels", "avx512"}};
-  records[1]["strategy"]["params"] = {{"kernels", "sse"}};
-  records[2]["strategy"].update(
-      {{"version", "Peer 3.2.1"}, {"instructions", "sse2"}, {"remark", "its update lies elsewhere"}});
-  EXPECT_EQ(instructions_of(records[0]), "avx512");
-  EXPECT_EQ(instructions_of(records[1]), "sse");
-  EXPECT_EQ(instructions_of(records[2]), "sse2");
-  const std::string table = results_table(records);
-  EXPECT_NE(table.find("    sse2  "), std::string::npos) << table;
-  EXPECT_NE(table.find("\n  peer is Peer 3.2.1: its update lies elsewhere\n"), std::string::npos) << table;
-}
-
-TEST(Table, CountersOfAStrategysOwnAreShown) {
-  std::vector<json> records{example_record("mine", "refit", 1)};
-  records[0]["counters"] = {{"box_tests", 5}, {"restarts", 7}, {"never", 0}};
-  EXPECT_NE(results_table(records).find("  mine counted restarts 7\n"), std::string::npos)
-      << results_table(records);
-}
-
-TEST(Table, ColumnsCountCharacters) {
-  EXPECT_EQ(columns({{"ä", "b"}, {"long", "2"}}), "ä     b\nlong  2\n");
 }
 
 }  // namespace

@@ -8,7 +8,6 @@
 // `scene` is the scene file of the lab. `l` is the number of frames per keyframe interval. `changes` holds
 // new flight plans, each applied at the first frame at or after its `time`.
 
-#include <algorithm>
 #include <cstdint>
 #include <cstdio>
 #include <exception>
@@ -54,20 +53,6 @@ World make_world(const json& request) {
   for (const json& pair : scene.value("pairs", json::array()))
     world.add_pair(pair.at(0).get<std::uint32_t>(), pair.at(1).get<std::uint32_t>());
   return world;
-}
-
-std::vector<double> frame_times(const json& scene, std::uint32_t l) {
-  std::vector<double> keyframes;
-  for (const json& body : scene.at("bodies"))
-    for (const json& time : body.at("times")) keyframes.push_back(time.get<double>());
-  std::sort(keyframes.begin(), keyframes.end());
-  keyframes.erase(std::unique(keyframes.begin(), keyframes.end()), keyframes.end());
-  std::vector<double> frames;
-  for (std::size_t k = 0; k + 1 < keyframes.size(); ++k)
-    for (std::uint32_t i = 0; i < l; ++i)
-      frames.push_back(keyframes[k] + (keyframes[k + 1] - keyframes[k]) * double(i) / double(l));
-  if (!keyframes.empty()) frames.push_back(keyframes.back());
-  return frames;
 }
 
 json to_json(const kbvh::WorldPiece& piece) {
@@ -149,7 +134,7 @@ json play(const json& request) {
   if (l < 1 || l > 10000)
     throw std::invalid_argument("l = " + std::to_string(l) +
                                 ": expected 1 to 10000 frames per keyframe interval");
-  const std::vector<double> frames = frame_times(scene, l);
+  const std::vector<double> frames = world.frame_times(l);
   world.start(request.at("strategy").get<std::string>(), words(request.value("params", json::object())),
               frames.front(), words(request.value("topology", json::object())));
   json trace = {{"frames", json::array()}, {"steps", json::array()}};

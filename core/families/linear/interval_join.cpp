@@ -17,7 +17,7 @@ void IntervalJoin<S>::start(const LinearSegment<S>& segment, const SceneView<S>&
   found_.clear();
   leaf_pairs_room_ = leaf_pairs;
   node_tests_ = 0;
-  leaf_pairs_seen_ = leaf_pairs_left_ = 0;
+  leaf_pairs_seen_ = 0;
   reading_ = indexed_ = has_beginning_ = false;
   following_ = {};
   throughout_ = count_ = 0;
@@ -139,7 +139,6 @@ void IntervalJoin<S>::take_leaves(std::size_t end, LeavesOf leaves) {
     leaf_join_.count = filter_leaves(end);
     leaf_join_.masks = masks_.data();
   }
-  leaf_pairs_left_ += leaf_join_.count - leaf_join_.next;
   while (leaf_join_.next < leaf_join_.count) {
     leaf_join_.throughout = found_throughout_.view(leaf_join_.throughout.found, false);
     leaf_join_.partly = found_partly_.view(leaf_join_.partly.found, true);

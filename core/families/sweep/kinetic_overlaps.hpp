@@ -48,7 +48,6 @@ class KineticOverlaps {
   std::uint32_t body_pair(BoxPairSet::Pair boxes) const {
     return find_pair(body_of_[boxes.a], body_of_[boxes.b]);
   }
-  std::uint32_t box_count() const { return std::uint32_t(body_of_.size()); }
   /// Returns the list of an axis; set its lines before `start` and `renew`.
   Order& order(std::size_t axis) { return orders_[axis]; }
   const Order& order(std::size_t axis) const { return orders_[axis]; }

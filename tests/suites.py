@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Runs the registered tests with one process for all cases of a suite, where CTest starts one for each case.
 
-usage: quick.py BUILD [CTEST OPTION...]
+usage: suites.py BUILD [CTEST OPTION...]
 
 The options choose tests as ctest does (-L, -LE, -R, -E). Suites run side by side, those first that took longest in this
 build before. A case that fails is printed with what its executable said. Exit code 1 if any failed.
@@ -16,6 +16,7 @@ import time
 
 import skipped
 
+SHORTEST_LIMIT = 1200  # seconds, of all cases of a suite together
 LONGEST_FILTER = 100_000  # of one argument; Linux takes 131,072 characters
 
 
@@ -27,7 +28,7 @@ def registered(build, options):
 
 
 def batches(tests):
-    """Groups cases of one GoogleTest suite: [(name, number of cases, command, environment, folder, expected output)]."""
+    """Groups cases of one GoogleTest suite: [(name, number of cases, command, environment, folder, expected output, seconds)]."""
     groups = {}
     for test in tests:
         properties = {p["name"]: p["value"] for p in test.get("properties", [])}
@@ -38,10 +39,11 @@ def batches(tests):
         case = cases[0].split("=", 1)[1] if cases else None
         suite = test["name"] if case is None else case.rpartition(".")[0]
         key = (tuple(rest), environment, folder, suite)
-        groups.setdefault(key, (test["name"], [], properties.get("PASS_REGULAR_EXPRESSION", ())))[1].append(case)
-    for (command, environment, folder, suite), (name, cases, expected) in groups.items():
+        limit = max(properties.get("TIMEOUT", 0), SHORTEST_LIMIT)
+        groups.setdefault(key, (test["name"], [], properties.get("PASS_REGULAR_EXPRESSION", ()), limit))[1].append(case)
+    for (command, environment, folder, suite), (name, cases, expected, limit) in groups.items():
         if cases == [None]:
-            yield name, 1, list(command), environment, folder, expected
+            yield name, 1, list(command), environment, folder, expected, limit
             continue
         filters = [""]
         for case in cases:
@@ -50,28 +52,30 @@ def batches(tests):
             filters[-1] += (":" if filters[-1] else "") + case
         for part in filters:
             yield (f"{os.path.basename(command[0])} {suite}", part.count(":") + 1,
-                   [*command, "--gtest_brief=1", "--gtest_filter=" + part], environment, folder, expected)
+                   [*command, "--gtest_brief=1", "--gtest_filter=" + part], environment, folder, expected, limit)
 
 
 def run(batch):
-    name, count, command, environment, folder, expected = batch
+    name, count, command, environment, folder, expected, limit = batch
     variables = {**os.environ, **dict(entry.split("=", 1) for entry in environment)}
-    if "--gtest_filter=" in command[-1]:
-        variables.pop("GTEST_FILTER", None)  # for the suites in shards; here the cases are named
     begin = time.monotonic()
-    ran = subprocess.run(command, cwd=folder, env=variables, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-                         errors="replace")
-    code = ran.returncode
+    try:
+        ran = subprocess.run(command, cwd=folder, env=variables, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                             errors="replace", timeout=limit)
+        code, said = ran.returncode, ran.stdout
+    except subprocess.TimeoutExpired as late:
+        said = (late.stdout or b"").decode(errors="replace") + f"\nafter {limit:.0f} s it had not ended"
+        return name, count, 1, said, time.monotonic() - begin
     if expected:  # as for ctest, the output decides
-        code = 0 if any(re.search(text, ran.stdout, re.DOTALL) for text in expected) else code or 1
-    return name, count, code, ran.stdout, time.monotonic() - begin
+        code = 0 if any(re.search(text, said, re.DOTALL) for text in expected) else code or 1
+    return name, count, code, said, time.monotonic() - begin
 
 
 def main():
     if len(sys.argv) < 2:
         sys.exit(__doc__)
     begin = time.monotonic()
-    past = os.path.join(sys.argv[1], "quick_times.json")
+    past = os.path.join(sys.argv[1], "suite_times.json")
     before = {}
     if os.path.exists(past):
         with open(past) as file:

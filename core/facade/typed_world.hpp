@@ -1,0 +1,147 @@
+#pragma once
+// Internal to the façade.
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "core/facade/conversions.hpp"
+#include "core/motion/admissible.hpp"
+#include "core/scene/cut_polygons.hpp"
+
+namespace kbvh::facade {
+
+/// Returns the strategy, its parameters and the trees that it is started with.
+inline Contestant contestant_of(const std::string& strategy, const std::map<std::string, std::string>& params,
+                                const std::map<std::string, std::string>& topology) {
+  const StrategyEntry& entry = find_strategy(strategy);
+  for (const auto& [key, value] : topology)
+    if (key != "method" && key != "width" && key != "leaf_size")
+      throw std::invalid_argument("a topology has the keys method, width and leaf_size, not '" + key + "'");
+  const auto method = topology.find("method");
+  return {
+      &entry, params,
+      suitable_builder(entry.info,
+                       method == topology.end() ? std::nullopt : std::optional(build_method(method->second)),
+                       number_of(topology, "width"), number_of(topology, "leaf_size"))};
+}
+
+/// What a world of one scalar holds: the added bodies, the scene as it is played, and its session.
+template <class S>
+struct TypedWorld {
+  struct Copies {
+    std::vector<S> array[2];
+  };
+  Scene<S> scene;
+  std::unique_ptr<Scene<S>> played;  ///< the session refers to it
+  std::unique_ptr<Session<S>> started;
+  std::vector<Copies> given;                        ///< [body]
+  mutable std::uint64_t fetched_for_questions = 0;  ///< positions that are no work of the strategy
+  PhaseTimes ignored;
+  PairBuffer pairs, ended;
+  SpanBuffer spans;
+  ContactBuffer contacts;
+  std::vector<Ray<S>> rays;
+  std::vector<RayHit> hits;
+  EventDescription<S> done;
+
+  void check_not_started() const {
+    if (started) throw std::logic_error("the world has started, so its scene is fixed");
+  }
+  void check_body(std::uint32_t body) const {
+    if (body >= scene.bodies.size())
+      throw std::invalid_argument("there is no body " + std::to_string(body) + " among " +
+                                  std::to_string(scene.bodies.size()));
+  }
+  Session<S>& session() const {
+    if (!started) throw std::logic_error("the world has not started: call start first");
+    return *started;
+  }
+  double time() const { return session().playback().time(); }
+  EventSource<S>& events() const {
+    EventSource<S>* const source = session().strategy().events();
+    if (source == nullptr) throw std::logic_error("'" + session().info().id + "' does not declare events");
+    return *source;
+  }
+
+  /// Copies the scene as it is played: the added bodies stay if a strategy does not suit them.
+  Scene<S> whole_scene() const {
+    Scene<S> whole = scene;
+    if (whole.pairs.empty()) whole.pairs = all_pairs(whole.bodies);
+    validate(whole);
+    return whole;
+  }
+
+  /// Returns the positions of a body, evaluated for a question.
+  const S* fetched(std::uint32_t body) {
+    Playback<S>& playback = session().playback();
+    const std::uint64_t before = playback.fetched();
+    playback.fetch_all(body);
+    fetched_for_questions += playback.fetched() - before;
+    return playback.positions(body);
+  }
+
+  template <class T>
+  std::uint32_t add(const std::string& name, const Connectivity& connectivity, std::span<const double> times,
+                    std::span<const T> positions) {
+    const std::size_t frames = times.size();
+    if (frames == 0 || positions.size() % (3 * frames) != 0)
+      throw std::invalid_argument("body '" + name + "': " + std::to_string(positions.size()) +
+                                  " coordinates for " + std::to_string(frames) + " keyframes");
+    const auto vertices = std::uint32_t(positions.size() / (3 * frames));
+    return add(name, connectivity,
+               FlightPlans<S>(vertices, {times.begin(), times.end()}, converted<S>(positions)));
+  }
+  template <class T>
+  std::uint32_t add(const std::string& name, const Connectivity& connectivity, std::span<const T> positions) {
+    if (positions.size() % 3 != 0)
+      throw std::invalid_argument("body '" + name + "': " + std::to_string(positions.size()) +
+                                  " coordinates are no positions");
+    const auto vertices = std::uint32_t(positions.size() / 3);
+    return add(name, connectivity, FlightPlans<S>::handed_in(vertices, converted<S>(positions)));
+  }
+  std::uint32_t add(const std::string& name, const Connectivity& connectivity, FlightPlans<S> plans) {
+    check_not_started();
+    Scene<S> alone;
+    alone.bodies.push_back({name, primitives_of(connectivity), std::move(plans)});
+    validate(alone);
+    cut_polygons(alone);
+    scene.bodies.push_back(std::move(alone.bodies[0]));
+    return std::uint32_t(scene.bodies.size() - 1);
+  }
+
+  template <class T>
+  void set(std::uint32_t body, std::span<const T> positions) {
+    check_body(body);
+    session();
+    const Body<S>& target = played->bodies[body];
+    if (!target.plans.is_handed_in())
+      throw std::logic_error("the motion of body '" + target.name + "' is known; positions cannot be set");
+    const std::size_t size = std::size_t(3) * target.plans.vertex_count();
+    if (positions.size() != size && positions.size() != size + 1)
+      throw std::invalid_argument("body '" + target.name + "' has " + std::to_string(size) +
+                                  " coordinates, not " + std::to_string(positions.size()));
+    for (std::size_t i = 0; i < size; ++i)
+      if (!(std::abs(S(positions[i])) <= admissible_magnitude<S>))
+        throw std::invalid_argument("body '" + target.name + "', vertex " + std::to_string(i / 3) +
+                                    ": coordinate " + number_text(double(positions[i])) +
+                                    " is not finite or not admissible");
+    if constexpr (std::is_same_v<S, T>)
+      if (positions.size() == size + 1) {
+        session().hand_in(body, positions.data());
+        return;
+      }
+    // Two alternating copies: a sweep begins at the positions that the motion view still shows.
+    std::vector<S>* const copies = given[body].array;
+    std::vector<S>& copy = copies[session().playback().positions(body) == copies[0].data() ? 1 : 0];
+    copy.resize(size + 1);
+    for (std::size_t i = 0; i < size; ++i) copy[i] = S(positions[i]);
+    session().hand_in(body, copy.data());
+  }
+};
+
+}  // namespace kbvh::facade
