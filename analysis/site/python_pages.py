@@ -15,6 +15,7 @@ PARTS = {
     "Scenes": ["scene", "builtin_scenes", "load", "shapes", "Scene", "Body", "PlanChange"],
     "Playing a scene": ["World", "Hierarchy", "Audit", "Step", "padded", "counters"],
     "Strategies": ["strategies", "describe"],
+    "The broad phase of a simulator": ["BroadPhase"],
     "A strategy of one's own": ["Strategy", "Parameter", "SceneView", "BodyView", "register", "check", "Verdict", "small_scenes"],
     "Trees as arrays": ["Tree", "refit", "overlapping", "primitive_bounds"],
     "Studies and results": ["plan", "run", "Run", "results"],
