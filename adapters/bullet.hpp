@@ -2,10 +2,10 @@
 // The shared part of both contestants of Bullet (Coumans). Both compute in float, as Debian's Bullet does,
 // and accept float scenes only. btOptimizedBvh takes triangles, btDbvt boxes.
 //
-// Range. bullet_bvh: 1e18. Bullet initialises boxes with that (BT_LARGE_FLOAT); with scale=none a box beyond
-// it reaches back to it, is quantised to a negative number of cells, and is wrong after the conversion to
-// unsigned. bullet_dbvt: everything admissible. Products of extents decide how its tree is built, at a
-// moderate scale; its queries, refits and insertions add and compare.
+// Range. bullet_bvh: 1e18. Bullet initialises boxes with that value (BT_LARGE_FLOAT). With scale=none a box
+// beyond it extends back to it, is quantised to a negative number of cells, and is wrong after the conversion
+// to unsigned. bullet_dbvt: everything admissible. Products of extents decide how its tree is built, at a
+// moderate scale; its queries, refits and insertions only add and compare.
 #include <LinearMath/btVector3.h>
 
 #include <algorithm>

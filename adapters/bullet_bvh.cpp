@@ -1,20 +1,21 @@
 // Bullet's quantised hierarchy of a triangle mesh (Coumans) as a contestant: btOptimizedBvh, updated by
 // refit().
 //
-// - The hierarchy is always quantised: without quantisation refit() does nothing, and does not say so.
+// - The hierarchy is always quantised: without quantisation refit() silently does nothing.
 // - refit() enlarges the quantised bounds by 1.0, whatever the unit of the scene. A mesh of a few centimetres
 //   is then a handful of cells wide, and thousands of its pairs are false. By default the adapter therefore
 //   sets the mesh's own scaling (setScaling) to a power of two, which rounds nothing, so that the scene is
 //   32768 to 65536 units wide. `scale=none` shows Bullet without scaling.
 // - All bodies share one grid, so that cells of different bodies can be compared. Quantisation is monotone,
 //   lower bounds go to even cells and upper bounds to odd cells, so the cells of touching boxes overlap: no
-//   pair is lost. The grid extends 1/8 beyond the scene. The adapter lays it anew, for all bodies, when the
-//   scene leaves it or shrinks to a quarter of it. Finding the scene's bounds is part of the update.
+//   pair is lost. The grid extends 1/8 beyond the scene. The adapter lays out a new grid for all bodies when
+//   the scene leaves the old one or shrinks to a quarter of it. Finding the scene's bounds is part of the
+//   update.
 // - Bullet's own query is a box against a tree (reportAabbOverlappingNodex). `query=primitives` asks it for
 //   each primitive of the smaller body. Bullet's walk of two trees is not public. The default `query=trees`
 //   therefore descends both of Bullet's arrays of nodes here, which is faster; the overlap test is Bullet's.
-// - Cells are a share of the scene, so it takes more than 20 times the box tests of `bottom_up` where one
-//   vertex or triangle is far larger than everything else: the rest lies in a few cells.
+// - A cell's size is a share of the scene's, so it takes more than 20 times the box tests of `bottom_up`
+//   where one vertex or triangle is far larger than everything else: the rest lies in a few cells.
 // - Bullet stores a primitive's index in 21 bits.
 // - The adapter passes a primitive of more than three vertices as the triangle (lower, upper, first vertex),
 //   which has the polygon's box.
@@ -69,8 +70,8 @@ class BulletBvh final : public Contestant {
 
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& /*none*/) override {
     std::uint64_t tests = 0;
-    // Returns the box of a body's vertices, rounded to cells as both queries round: boxes that overlap there
-    // may overlap here.
+    // Returns the box of a body's vertices, rounded to cells like in both queries, so that every overlap
+    // there is one here.
     const auto box_of = [&](std::uint32_t body) { return root_box(bodies_[body]); };
     for (const std::uint32_t i : this->near_bodies_.find(box_of, tests)) {
       const BodyPair& pair = this->scene_.pairs()[i];
@@ -141,7 +142,7 @@ class BulletBvh final : public Contestant {
     Box<double> box(const btQuantizedBvhNode& node) const {
       Box<double> box;
       for (int axis = 0; axis < 3; ++axis) {
-        // A coordinate's cell results from two roundings in float: up to 65535 * 2^-23 of a cell.
+        // A cell's coordinate results from two roundings in float: errors of up to 65535 * 2^-23 of a cell.
         box.lower[axis] = (origin_[axis] + (node.m_quantizedAabbMin[axis] - .01) / cells_[axis]) / scale_;
         box.upper[axis] = (origin_[axis] + (node.m_quantizedAabbMax[axis] + .01) / cells_[axis]) / scale_;
       }
@@ -282,8 +283,8 @@ class BulletBvh final : public Contestant {
       largest = std::max(largest, upper - lower + 2 * slack);
     }
     if (!scaled_) return;
-    // Bullet initialises its boxes with 1e18, so no coordinate may come near that; and the scale itself must
-    // be a float.
+    // Bullet initialises its boxes with 1e18, so no coordinate may come near that value, and the scale itself
+    // must be a float.
     const int wanted = 15 - std::ilogb(largest), limit = 57 - std::ilogb(std::max(furthest, largest));
     scale_ = std::ldexp(1.f, std::clamp(std::min(wanted, limit), -120, 120));
   }

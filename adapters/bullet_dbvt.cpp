@@ -5,8 +5,7 @@
 //   also changes the tree. The default `update=refit` instead recomputes the volumes of all nodes, children
 //   first, with Bullet's Merge. That loop is not part of Bullet, but ten times faster. Boxes are tight in
 //   both cases.
-// - Insertions build the first tree. Insertion makes a list of identical boxes, which optimizeTopDown()
-//   divides.
+// - Insertions build the first tree. They make a list of identical boxes, which optimizeTopDown() divides.
 #include "bullet.hpp"
 
 #include <BulletCollision/BroadphaseCollision/btDbvt.h>
@@ -103,8 +102,7 @@ class BulletDbvt final : public Contestant {
 
  private:
   struct BodyState {
-    btDbvt
-        built;  // as it was built: updates of leaves change the shape of `tree`, and a clip begins with this
+    btDbvt built;  // the initial tree of each clip: updates of leaves change the shape of `tree`
     btDbvt tree;
     std::vector<btDbvtNode*> nodes;  // refit: all, children before parents; else leaves by primitive
   };
@@ -130,12 +128,12 @@ class BulletDbvt final : public Contestant {
     state.built.optimizeTopDown();
   }
 
-  /// Copies the tree as it was built, with the volumes of now.
+  /// Copies the initial tree, with the current volumes.
   void copy_built(std::uint32_t body) {
     BodyState& state = bodies_[body];
     const std::uint32_t count = this->scene_.primitives(body).count();
     if (count == 0) return;
-    // The copy has its nodes in memory in the order of a descent: both refits and queries profit.
+    // The copy has its nodes in memory in the order of a descent, which speeds up both refits and queries.
     btDbvt::IClone nothing_more;
     state.built.clone(state.tree, &nothing_more);
     state.tree.m_leaves = state.built.m_leaves;  // not copied by clone()
@@ -150,7 +148,7 @@ class BulletDbvt final : public Contestant {
         if (!refits_) state.nodes[std::size_t(node->dataAsInt)] = node;
         continue;
       }
-      // clone() puts the node at place i of its stack into childs[i & 1]; this order is therefore the memory
+      // clone() puts the node at place i of its stack into childs[i & 1]; hence this order is the memory
       // order.
       const std::size_t place = stack.size();
       stack.push_back(node->childs[place & 1]);

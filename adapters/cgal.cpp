@@ -4,15 +4,15 @@
 // licence: a program linked with this contestant is under one of the two, and kbvh's own MIT licence applies
 // without it.
 //
-// - Boxes are half-open or closed; kbvh's touch closed. CLOSED is passed explicitly.
-// - Two boxes with one id are never compared, and ids order boxes that begin at one coordinate. Ids of two
-//   sequences must therefore differ, or pairs are lost without a word; those of boxes by address change when
-//   the algorithm moves boxes. The ids here are body and primitive.
+// - Boxes can be half-open or closed; kbvh's touching boxes overlap. CLOSED is passed explicitly.
+// - Two boxes with the same id are never compared, and ids order boxes that begin at the same coordinate. Ids
+//   of two sequences must therefore differ, or pairs are silently lost. Ids derived from the boxes' addresses
+//   change when the algorithm moves boxes, so the ids here consist of body and primitive.
 // - A call permutes both sequences. `box_self_intersection_d` copies its sequence at every call, which
-//   allocates; the copy here keeps its memory, and the call is the one that CGAL makes of it.
+//   allocates; the adapter keeps the memory of its copy, and makes the same inner call as CGAL.
 // - `cutoff` is the length of lists that are scanned instead of divided. On mixing swarms of 16,000
 //   triangles CGAL's default of 10 takes 4.5 times as long as 1000 (100: 2.4 times, 5000: 1.2 times).
-// - The splits are random, by a generator that starts anew at every split: equal input gives equal work.
+// - The splits are random, by a generator that restarts at every split: equal input gives equal work.
 //
 // Range: everything admissible. CGAL compares coordinates and computes nothing with them.
 //
@@ -40,7 +40,7 @@ struct CgalBox {
   std::uint64_t id;  // body and primitive
 };
 
-/// What CGAL asks of a box.
+/// The interface that CGAL requires of a box.
 template <class S>
 struct CgalTraits {
   using Box_parameter = const CgalBox<S>&;

@@ -12,7 +12,7 @@
 //   are Embree's.
 // - triangles: the update refits triangle geometry over shared buffers, which is Embree's fastest refit. No
 //   query of pairs reads it: the query first refits user geometry, so ITS TIME INCLUDES A SECOND REFIT AND
-//   MUST NOT BE QUOTED. A body with other primitives than triangles gets one triangle (lower, upper, lower)
+//   MUST NOT BE QUOTED. A body with primitives other than triangles gets one triangle (lower, upper, lower)
 //   per primitive, which has the primitive's box; writing these triangles is part of the update.
 // Comparisons therefore take the update from `triangles`, and query and total from `user`. Rays read
 // triangles in either case.
@@ -22,13 +22,14 @@
 // faster.
 //
 // Threads. A device that is made with a number of threads limits TBB in the whole process while it exists:
-// with one thread, every other contestant of a run would have one, too. The adapter therefore makes the
+// with one thread, every other contestant of a run would have only one, too. The adapter therefore makes the
 // device without a number (threads=0), and makes every call within as many threads as the parameter asks for
 // (LibraryThreads). rtcCollide calls back from all of them. Each thread collects pairs in a list of its own,
-// so the order of pairs differs from call to call. kbvh's threads, as many, test the triangles.
+// so the order of pairs differs from call to call. The triangles are tested by the same number of kbvh's
+// threads.
 //
-// Candidates. rtcCollide compares the boxes of nodes, and so the box of each primitive that has a leaf of its
-// own. For larger leaves it reports all pairs, several at a time; the adapter filters these by the
+// Candidates. rtcCollide compares the boxes of nodes, and therefore the box of each primitive with a leaf of
+// its own. For larger leaves it reports all pairs, several at a time; the adapter filters these by the
 // primitives' boxes.
 //
 // Denormals. Embree flushes them. The adapter widens denormal bounds to the smallest normal number, so that
@@ -37,12 +38,12 @@
 // builder asserts that the box of all primitives is not a point.
 //
 // Range. Coordinates up to 1.8e18 (largest_coordinate): Embree treats bounds from 1.844e18 on as invalid,
-// leaves their primitives out without a word, and aborts the program where that leaves none.
+// silently leaves their primitives out, and aborts the program if no primitives are left.
 //
-// Rays. rtcIntersect1 and rtcOccluded1 on triangle geometry, body after body: the triangles of all
-// polygons in a scene that is refitted like the others. With geometry=triangles and bodies of triangles the
-// update itself refits it. Otherwise the first ray of a frame that enters the body does, so the time of rays
-// includes that refit. Bodies are entered front to back, and not at all behind the closest hit so far. Embree
+// Rays. rtcIntersect1 and rtcOccluded1 on triangle geometry, body after body: the triangles of all polygons
+// are in a scene that is refitted like the others. With geometry=triangles and bodies of triangles the update
+// itself refits it. Otherwise the first ray of a frame that enters the body triggers the refit, so the time
+// of rays includes it. Rays enter bodies front to back, and skip those behind the closest hit so far. Embree
 // decides in float, with no bound on its error, and may miss rays through edges and corners: its answers are
 // marked approximate, and their differences from the truth are counted.
 //
@@ -144,7 +145,7 @@ class EmbreeRefit final : public CountedStrategy<S>, public AnswersRays<S>, publ
     std::vector<float>
         own_vertices;  // three per primitive and padding, for bodies with primitives other than triangles
     std::vector<std::uint32_t> own_indices;
-    // For rays, made at the first of them.
+    // For rays, made when the first one is asked.
     RefitScene own_cuts;  // unless `triangles` serves
     bool cuts_are_triangles = false, cuts_are_old = true;
     const float* cut_vertices = nullptr;
@@ -162,7 +163,7 @@ class EmbreeRefit final : public CountedStrategy<S>, public AnswersRays<S>, publ
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 
   void make_device(const SceneView<S>& scene, const SampledMotion<S>& motion) {
-    // Before Embree changes the floating-point state: positions may be evaluated by threads that inherit it.
+    // Evaluates positions before Embree changes the floating-point state, which the threads would inherit.
     for (std::uint32_t body = 0; body < scene.body_count(); ++body)
       for (std::uint32_t v = 0; v < scene.vertex_count(body); ++v) motion.position(body, v);
     const KeepFloatingPointState keep;
@@ -197,8 +198,8 @@ class EmbreeRefit final : public CountedStrategy<S>, public AnswersRays<S>, publ
     check();
   }
 
-  /// Returns the box of a body of polygons. Boxes that the update has refitted serve; a body behind others is
-  /// not refitted for rays.
+  /// Returns the box of a body of polygons. Uses boxes that the update has refitted, if any; a body behind
+  /// others is not refitted for rays.
   Box<float> box_for_rays(BodyState& state) {
     if (state.primitives->kind != PrimitiveKind::polygons || !state.boxes.scene) return {};
     if (!state.boxes_are_old) return bounds_of_scene(state.boxes);
@@ -354,7 +355,7 @@ class EmbreeRefit final : public CountedStrategy<S>, public AnswersRays<S>, publ
 
   using Lanes = Eigen::Array4f;
   struct Bounds {
-    Lanes lower, upper;  // the last lane means nothing
+    Lanes lower, upper;  // the last lane is unused
   };
   static auto position(const BodyState& state, std::uint32_t v) {
     return Eigen::Map<const Lanes>(state.positions + std::size_t(3) * v);

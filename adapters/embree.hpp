@@ -1,5 +1,5 @@
 #pragma once
-// Owners of Embree's objects, and what the adapter asks of them.
+// Owners of Embree's objects, and the adapter's queries of them.
 #include <embree3/rtcore.h>
 
 #include <cstdint>
@@ -48,13 +48,13 @@ using DevicePointer = std::unique_ptr<std::remove_pointer_t<RTCDevice>, ReleaseD
 using ScenePointer = std::unique_ptr<std::remove_pointer_t<RTCScene>, ReleaseScene>;
 using GeometryPointer = std::unique_ptr<std::remove_pointer_t<RTCGeometry>, ReleaseGeometry>;
 
-/// What the library states about itself.
+/// The properties that the library reports about itself.
 struct EmbreeFacts {
   std::string version, instructions;
 };
 
-/// Asks a device of default configuration for the version of the library and for the widest instruction set
-/// that it runs here. An unknown version is empty.
+/// Asks a device with the default configuration for the version of the library and for the widest instruction
+/// set that it uses here. An unknown version is empty.
 inline EmbreeFacts embree_facts() {
   const KeepFloatingPointState keep;
   const DevicePointer device(rtcNewDevice("threads=0,set_affinity=0"));
@@ -97,8 +97,8 @@ struct RefitScene {
   }
 };
 
-/// The largest coordinate that is passed to Embree. Its FLT_LARGE is 1.844e18: it leaves primitives out whose
-/// bounds reach that, and asserts that rays do not.
+/// The largest coordinate that is passed to Embree. Its FLT_LARGE is 1.844e18: it leaves out primitives whose
+/// bounds reach that value, and asserts that rays do not.
 inline constexpr double largest_coordinate = 1.8e18;
 
 inline Box<float> bounds_of_scene(const RefitScene& scene) {
@@ -107,7 +107,7 @@ inline Box<float> bounds_of_scene(const RefitScene& scene) {
   rtcGetSceneBounds(scene.scene.get(), &bounds);
   return {{bounds.lower_x, bounds.lower_y, bounds.lower_z}, {bounds.upper_x, bounds.upper_y, bounds.upper_z}};
 }
-/// Returns a ray as Embree takes it; geometry identifiers are those of no hit.
+/// Returns a ray in Embree's form, with the geometry identifiers of a miss.
 inline RTCRayHit ray_of(const Ray<float>& ray) {
   RTCRayHit made{};
   made.ray.org_x = ray.origin[0];

@@ -20,14 +20,13 @@
 //   is monotone in the exact sum: bodies that overlap still overlap, but a vertex may lie half a unit in the
 //   last place outside of its 18-DOP. Hence there is no audit of 18-DOPs.
 // - FCL's test of two AABBs is closed, and its AABBs are unions of vertices: they are tight to the last bit.
-// - FCL recurses in its mean-split tree and in its traversal. The number of primitives bounds the depth, not
-//   its logarithm.
+// - FCL recurses in its mean-split tree and in its traversal. The depth of the recursion is bounded by the
+//   number of primitives, not by its logarithm.
 // - The float version does not accept double scenes: rounding the positions would lose pairs.
-// - Range. FCL descends where the squared diagonal of a box is larger: with coordinates up to X that is
-//   12 X^2, which overflows in float above 5e18; both sides then count as equal, and a query tests 1.4 times
-//   as many boxes. Its triangle test projects on axes that are products of three edges: sums of at most 192
-//   X^4, which overflow above 1.1e9 in float and 3e76 in double; a thousand times beyond, it misses every
-//   pair.
+// - Range. FCL descends into the box with the larger squared diagonal. With coordinates up to X that is 12
+//   X^2, which overflows in float above 5e18; both sides then count as equal, and a query tests 1.4 times as
+//   many boxes. Its triangle test projects on axes that are products of three edges: sums of at most 192 X^4,
+//   which overflow above 1.1e9 in float and 3e76 in double; a thousand times beyond, it misses every pair.
 #include <fcl/config.h>
 #include <fcl/geometry/bvh/BVH_model.h>
 #include <fcl/math/bv/AABB.h>
@@ -311,8 +310,8 @@ class Fcl final : public CountedStrategy<S>, public TakesPlanChanges<S> {
                                std::to_string(status));
   }
 
-  /// Performs FCL's triangle test on the triangles of polygons; FCL would compare only triangles whose boxes
-  /// overlap.
+  /// Performs FCL's triangle test on the triangles of polygons. FCL itself would compare only triangles with
+  /// overlapping boxes.
   bool own_verdict(const PrimitivePair& pair) {
     const Primitives& primitives_a = this->scene_.primitives(pair.body_a);
     const Primitives& primitives_b = this->scene_.primitives(pair.body_b);

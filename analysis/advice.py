@@ -1,11 +1,11 @@
 """Which strategy for what, by one rule over the cells of a study: for the report, its lines on the terminal, the guide and the site.
 
 A cell is one scene at one size, scalar and l, as measured by one program on one machine. Strategies with a guarantee and one thread take
-part, each with its fastest setting of the cell; a cell without a refit, or with a single strategy, counts nowhere. A strategy's speed
-in a cell is the time of the best refit over its own, of whole clips, positions included. A situation is what is known of the future, the
-frames from one keyframe to the next, and what is asked. **The rule:** of the strategies that need to know no more than is known, and
+part, each with its fastest setting of the cell; a cell without a refit, or with a single strategy, is left out. A strategy's speed
+in a cell is the time of the best refit over its own, of whole clips, positions included. A situation is the knowledge of the future, the
+frames from one keyframe to the next, and the question asked. **The rule:** of the strategies that need to know no more than is known, and
 were measured in at least half of the situation's cells, take the one with the largest geometric mean of its speeds; a cell in which it
-was not measured counts as its slowest. The explorer has the same rule (explorer/src/advice.js), and a test compares both.
+was not measured counts as its slowest. The explorer uses the same rule (explorer/src/advice.js), and a test compares the two.
 
 usage: advice.py RESULTS_DIR [--write PAGE]     prints the table, or puts it between `<!-- advice -->` and `<!-- /advice -->`
 """
@@ -48,7 +48,7 @@ PAIRS, SELF = "pairs of two bodies", "pairs within a body, too"
 
 
 def asked(row: Any) -> str:
-    """Says what a cell asks for, from the record of one of its contestants."""
+    """Returns what a cell asks for, from the record of one of its contestants."""
     if row["rays"]:
         return "rays"
     if row["continuous"]:
@@ -91,7 +91,7 @@ class Cell:
 
 @dataclass
 class Advice:
-    """The strategy that the rule takes in one situation."""
+    """The strategy that the rule chooses in one situation."""
 
     id: str
     title: str
@@ -108,7 +108,7 @@ class Advice:
 
     @property
     def says(self) -> str:
-        """Tells the speed, as in "1.6 times as fast as the best refit (0.9 to 2.1 in 8 cells)"."""
+        """Writes the speed out, as in "1.6 times as fast as the best refit (0.9 to 2.1 in 8 cells)"."""
         missing = f", measured in {self.measured}" if self.measured < self.cells else ""
         if self.baseline and not self.best_in:
             span = text.factor(self.low) + (f" to {text.factor(self.high)}" if self.low < self.high else "")
@@ -253,7 +253,7 @@ def _title(row: pd.Series) -> str:
 
 
 def sentence(one: Situation) -> str:
-    """Tells the advice of a situation in one sentence; what more knowledge does not change is not repeated."""
+    """Writes the advice of a situation in one sentence; advice that more knowledge does not change is not repeated."""
     parts: list[str] = []
     last = ""
     for known, best in one.advice:

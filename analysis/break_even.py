@@ -19,9 +19,9 @@ from colours import FAMILIES, Look
 from figures import WIDTH
 
 QUANTITIES = ("update", "total", "total with motion")
-FAMILY = "kinetic"  #: whose break-even points are drawn, and told first
-NEVER = ("period", "oracle", "limit")  #: whose are not
-#: Quantities by which a strategy alone is no baseline: the query of the hybrid refit does a part of its update.
+FAMILY = "kinetic"  #: the family whose break-even points are drawn, and listed first
+NEVER = ("period", "oracle", "limit")  #: families whose points are not drawn
+#: Quantities for which these baselines do not count: the query of the hybrid refit does a part of its update.
 NOT_ALONE = {"update": ["hybrid"], "update with motion": ["hybrid"], "query": ["hybrid"]}
 DRAWN = (("update", "update"), ("total with motion", "update, query and motion"))
 AHEAD, BEHIND, CROSSES, MIXED = "ahead", "behind", "crosses", "mixed"

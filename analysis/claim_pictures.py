@@ -14,7 +14,7 @@ from html import escape
 from typing import Any, Optional, Sequence
 
 import text
-from claim_points import Looked, Point
+from claim_points import CheckResult, Point
 from claim_words import NOT_MEASURED, number, rule, wanted, where
 
 WIDTH, LEFT, RIGHT = 424, 170, 8  #: of the drawing, of the names at its left, of the room at its right
@@ -62,7 +62,7 @@ class Block:
         return self.bound * (1 - self.tolerance), math.inf
 
 
-def of_experiment(looked: Sequence[Looked]) -> str:
+def of_experiment(looked: Sequence[CheckResult]) -> str:
     """Draws a claim's checks; empty without measurements.
 
     A check with corners has a block of its own, or shares one with those of the same "row"; checks without corners that claim
@@ -83,7 +83,7 @@ def of_experiment(looked: Sequence[Looked]) -> str:
     return draw([block for block in blocks.values() if block.bars])
 
 
-def _bars(one: Looked) -> list[Bar]:
+def _bars(one: CheckResult) -> list[Bar]:
     """Returns a bar for each corner; without corners one for the check, or one for each scene if the check has no name."""
 
     def marks(points: list[Point]) -> list[Mark]:
@@ -268,6 +268,6 @@ def said(blocks: Sequence[Block], unit: str = "") -> str:
     return f"{head}. {' '.join(told)}"
 
 
-def picture(looked: Sequence[Looked], criteria: Optional[Sequence[dict[str, Any]]] = None) -> str:
+def picture(looked: Sequence[CheckResult], criteria: Optional[Sequence[dict[str, Any]]] = None) -> str:
     """Draws either kind of claim."""
     return of_experiment(looked) if looked else of_theory(criteria or [])

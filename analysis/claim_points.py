@@ -75,7 +75,7 @@ class Corner:
     id: str  #: "" where the check has only one
     name: str  #: in a sentence
     who: str  #: the side that is judged, without what it is compared with
-    short: str  #: beside a picture
+    short: str  #: the text next to a picture
     above: dict[str, Any]  #: the numerator, or the only term
     below: Optional[dict[str, Any]]
     optional: bool  #: its absence leaves the claim decided
@@ -83,7 +83,7 @@ class Corner:
 
 
 @dataclass
-class Looked:
+class CheckResult:
     """All points of one check, and the missing data."""
 
     check: dict[str, Any]
@@ -252,7 +252,7 @@ def words_of(term: dict[str, Any]) -> str:
     return f"{who} ({told})" if told else who
 
 
-class Looker:
+class CheckEvaluator:
     """Evaluates checks on one study."""
 
     def __init__(
@@ -262,11 +262,11 @@ class Looker:
         self.baselines = {one["id"]: one for one in baselines}
         self.squares = squares or {}
 
-    def look(self, check: dict[str, Any]) -> Looked:
+    def look(self, check: dict[str, Any]) -> CheckResult:
         """Returns all points of the check, and the missing data. Raises ClaimError for an inconsistent check."""
         if check["measure"] not in MEASURES:
             raise ClaimError(f'the measure "{check["measure"]}" is none of {", ".join(MEASURES)}')
-        looked = Looked(check, self._corners(check))
+        looked = CheckResult(check, self._corners(check))
         for quantity in check["quantities"]:
             for corner in looked.corners:
                 for scene in check["scenes"]:

@@ -6,7 +6,7 @@ import re
 from typing import Any
 
 import text
-from claim_points import Corner, Looked, Point
+from claim_points import Corner, CheckResult, Point
 
 NOT_MEASURED = "not measured here"
 
@@ -51,19 +51,19 @@ def where(points: list[Point]) -> str:
     return f"met at {len(good)} of {len(points)} points ({told})"
 
 
-def several(looked: Looked) -> bool:
+def several(looked: CheckResult) -> bool:
     """Returns whether the check is evaluated with and without motion evaluation."""
     return any(quantity.endswith("with motion") for quantity in looked.check["quantities"])
 
 
-def motion(looked: Looked, quantity: str) -> str:
+def motion(looked: CheckResult, quantity: str) -> str:
     """Describes the difference between a quantity and the check's other quantities."""
     if quantity.endswith("with motion"):
         return "with motion evaluation"
     return "without motion evaluation" if several(looked) else ""
 
 
-def kinds(looked: Looked) -> list[tuple[Corner, str, list[Point]]]:
+def kinds(looked: CheckResult) -> list[tuple[Corner, str, list[Point]]]:
     """Returns corner, quantity and points, for each pair with points."""
     found = []
     for corner in looked.corners:
@@ -74,7 +74,7 @@ def kinds(looked: Looked) -> list[tuple[Corner, str, list[Point]]]:
     return found
 
 
-def rule(looked: Looked, corner: Corner) -> str:
+def rule(looked: CheckResult, corner: Corner) -> str:
     """Describes where a corner is met, over its quantities; "not measured here" without points."""
     rules = {quantity: where(mine) for one, quantity, mine in kinds(looked) if one.id == corner.id}
     if not rules:
@@ -84,7 +84,7 @@ def rule(looked: Looked, corner: Corner) -> str:
     return ", ".join(f"{told} {motion(looked, quantity)}".strip() for quantity, told in rules.items())
 
 
-def unmeasured(looked: list[Looked]) -> list[str]:
+def unmeasured(looked: list[CheckResult]) -> list[str]:
     """Names the corners, and parts of corners, that were not measured."""
     found: dict[str, list[str]] = {}  # names by what is said of them
     said_already = {gap for one in looked for gap in one.missing}
@@ -100,13 +100,13 @@ def unmeasured(looked: list[Looked]) -> list[str]:
     return [f"{text.listing(list(dict.fromkeys(names)))}{said}" for said, names in found.items()]
 
 
-def details(looked: Looked) -> list[str]:
+def details(looked: CheckResult) -> list[str]:
     """Lists the missing data of one check, optional corners included."""
     optional = [f"{corner.name}: {gap}" for corner in looked.corners for gap in looked.gaps.get(corner.id, [])]
     return looked.missing + optional
 
 
-def as_in_2006(looked: list[Looked]) -> list[str]:
+def as_in_2006(looked: list[CheckResult]) -> list[str]:
     """Names the structures at their best whose points come from the same records as those of an earlier corner."""
     names = []
     for one in looked:
@@ -119,7 +119,7 @@ def as_in_2006(looked: list[Looked]) -> list[str]:
     return list(dict.fromkeys(names))
 
 
-def sentence(one: Looked) -> str:
+def sentence(one: CheckResult) -> str:
     """Describes a check: the measured values, where it is met, and the requirement."""
     parts = []
     for corner, quantity, mine in kinds(one):
@@ -142,7 +142,7 @@ def sentence(one: Looked) -> str:
     return f"{_capital(one.check['what'])} (wanted: {wanted(one.check)}): " + "; ".join(parts) + "."
 
 
-def condition(looked: list[Looked]) -> str:
+def condition(looked: list[CheckResult]) -> str:
     """Returns the condition under which all checks are met, one clause for each check that is not met everywhere."""
     clauses = []
     for one in looked:
@@ -156,7 +156,7 @@ def condition(looked: list[Looked]) -> str:
     return ". ".join(clauses)
 
 
-def brief(looked: list[Looked], missing: list[str]) -> str:
+def brief(looked: list[CheckResult], missing: list[str]) -> str:
     """Explains the verdict in two sentences: where the checks are met, and the measured range."""
     known = [one for one in looked if one.points]
     if missing:
@@ -182,13 +182,13 @@ def brief_theory(condition_said: str, why: str) -> str:
     return " ".join(sentences[:2])
 
 
-def _alike(looked: list[Looked], first: Looked) -> list[Looked]:
+def _alike(looked: list[CheckResult], first: CheckResult) -> list[CheckResult]:
     """Returns the checks with the same requirement as the first one."""
     same = ("measure", "relation", "bound")
     return [one for one in looked if all(one.check[name] == first.check[name] for name in same)]
 
 
-def _rules(one: Looked, named: bool) -> str:
+def _rules(one: CheckResult, named: bool) -> str:
     """Describes where one check is met; corners with the same rule share a clause."""
     by_rule: dict[str, list[str]] = {}
     for corner in one.corners:
@@ -203,14 +203,14 @@ def _rules(one: Looked, named: bool) -> str:
     return name + "; ".join([*parts, "nowhere else"] if "met nowhere" in by_rule else parts)
 
 
-def _range(looked: list[Looked], word: str) -> str:
+def _range(looked: list[CheckResult], word: str) -> str:
     """Compares the measured extremes with the claimed value."""
     points = [(point, one) for one in looked for point in one.points]
     if not points:
         return ""
     shorts = {(id(one), corner.id): corner.short for one in looked for corner in one.corners}
 
-    def shown(point: Point, one: Looked) -> str:
+    def shown(point: Point, one: CheckResult) -> str:
         at = [one.check.get("short", "")] if len(looked) > 1 else []
         at += [shorts[(id(one), point.corner)], place(point)]
         return f"{text.factor(point.value.middle)} ({', '.join(part for part in at if part)})"

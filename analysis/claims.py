@@ -17,7 +17,7 @@ from typing import Any, Optional
 
 import files
 import text
-from claim_points import SLACK, ClaimError, Looked, Looker, Table
+from claim_points import SLACK, ClaimError, CheckResult, CheckEvaluator, Table
 from claim_words import NOT_MEASURED, as_in_2006, brief, brief_theory, condition, rule, sentence, unmeasured
 from load import ResultError, Study, load, read_json
 
@@ -70,10 +70,10 @@ class Row:
     checks: list[dict[str, Any]] = field(default_factory=list)  #: for the data file
     brief: str = ""  #: why, in two sentences
     corners: list[CornerVerdict] = field(default_factory=list)  #: of checks with a square, each for itself
-    shown: str = ""  #: numbers beside the verdict
+    shown: str = ""  #: numbers next to the verdict
     unmeasured: list[str] = field(default_factory=list)  #: corners that were not measured, or not all of them
     as_in_2006: list[str] = field(default_factory=list)  #: corners at their best that are no faster than in 2006
-    looked: list[Looked] = field(default_factory=list)  #: for the picture and the tables
+    looked: list[CheckResult] = field(default_factory=list)  #: for the picture and the tables
 
 
 @dataclass
@@ -92,7 +92,7 @@ def read_claims(file: Path = FILE) -> dict[str, Any]:
 def evaluate(study: Study, folder: Path, file: Path = FILE) -> Claims:
     """Evaluates every claim, theory first. Raises ClaimError."""
     said = read_claims(file)
-    looker = Looker(Table(study, said["scalar"]), said["baselines"], said.get("squares", {}))
+    looker = CheckEvaluator(Table(study, said["scalar"]), said["baselines"], said.get("squares", {}))
     try:
         rows = theory_rows(said["theory"], folder)
         rows += [experiment_row(claim, looker) for claim in said["claims"]]
@@ -130,7 +130,7 @@ def theory_rows(listed: list[dict[str, Any]], folder: Path) -> list[Row]:
     return rows
 
 
-def experiment_row(claim: dict[str, Any], looker: Looker) -> Row:
+def experiment_row(claim: dict[str, Any], looker: CheckEvaluator) -> Row:
     """Checks one claim against the measurements."""
     looked = [looker.look(check) for check in claim["checks"]]
     missing = list(dict.fromkeys(gap for one in looked for gap in one.missing))
@@ -167,7 +167,7 @@ def experiment_row(claim: dict[str, Any], looker: Looker) -> Row:
     )
 
 
-def verdict_of(looked: list[Looked]) -> str:
+def verdict_of(looked: list[CheckResult]) -> str:
     """Decides: undecided while data are missing; refuted by a check that is met nowhere; else by whether all points are met.
 
     A check with optional corners only does not count without points.
@@ -180,17 +180,17 @@ def verdict_of(looked: list[Looked]) -> str:
     return HOLDS if all(point.met for one in looked for point in one.points) else CONDITION
 
 
-def corner_verdicts(looked: Looked) -> list[CornerVerdict]:
+def corner_verdicts(looked: CheckResult) -> list[CornerVerdict]:
     """Evaluates each corner of a check by itself."""
     found = []
     for corner in looked.corners:
         mine = [point for point in looked.points if point.corner == corner.id]
-        verdict = verdict_of([Looked(looked.check, [corner], mine)]) if mine else NOT_MEASURED
+        verdict = verdict_of([CheckResult(looked.check, [corner], mine)]) if mine else NOT_MEASURED
         found.append(CornerVerdict(looked.check["what"], corner.id, corner.name, verdict, rule(looked, corner)))
     return found
 
 
-def apart(looked: list[Looked]) -> list[Apart]:
+def apart(looked: list[CheckResult]) -> list[Apart]:
     """Evaluates the claim on the deciding scenes, and on each optional scene, at the l that all of them have; empty without
     optional scenes.
     """
@@ -208,7 +208,7 @@ def apart(looked: list[Looked]) -> list[Apart]:
     found = []
     for scenes in parts:
         part = [
-            Looked(one.check, one.corners, [p for p in one.points if p.scene in scenes and p.l in common]) for one in looked
+            CheckResult(one.check, one.corners, [p for p in one.points if p.scene in scenes and p.l in common]) for one in looked
         ]
         verdict = verdict_of(part)
         found.append(Apart(scenes, sorted(common), verdict, condition(part) if verdict == CONDITION else ""))
@@ -237,7 +237,7 @@ def differences(separate: list[Apart], table: Table, claim: dict[str, Any]) -> s
     return f"{one['what'][0].upper()}{one['what'][1:]}: {told}." if common else ""
 
 
-def ours(looked: list[Looked]) -> dict[str, str]:
+def ours(looked: list[CheckResult]) -> dict[str, str]:
     """Returns the range of the first check for each corner, followed by further quantities and checks."""
     result: dict[str, list[str]] = {}
     for one in looked:
@@ -273,7 +273,7 @@ def shown(one: dict[str, Any], table: Table, claim: dict[str, Any]) -> str:
     return f"{one['what'][0].upper()}{one['what'][1:]} at {text.size(largest)} polygons: {told}."
 
 
-def _check_record(one: Looked) -> dict[str, Any]:
+def _check_record(one: CheckResult) -> dict[str, Any]:
     return {
         **{name: one.check[name] for name in ("what", "measure", "quantities", "relation", "bound", "tolerance")},
         "missing": one.missing,

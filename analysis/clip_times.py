@@ -24,7 +24,7 @@ class RawTimes:
     """The times of one run, in ms: of each repetition and frame, and sums of phases over the frames of the clip and of the
     steady frames.
 
-    Records of schema 1 know means per frame only: they are the one frame of each repetition, and count by clips.
+    Records of schema 1 have only means per frame: these are the one frame of each repetition, and count by clips.
     """
 
     totals: np.ndarray  #: [repetition][frame]

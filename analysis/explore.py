@@ -89,7 +89,7 @@ def page(content: dict[str, Any], script: str, style: str) -> str:
 <style>{style}</style>
 </head>
 <body>
-<noscript><p>This page needs JavaScript; report.html beside it does not.</p></noscript>
+<noscript><p>This page needs JavaScript; report.html next to it does not.</p></noscript>
 <script type="application/json" id="data">{data}</script>
 <script>{script}</script>
 </body>

@@ -139,7 +139,7 @@ def _limit(row: pd.Series) -> int:
 
 
 def _machines(rows: list[pd.Series]) -> list[tuple[dict[str, Any], str]]:
-    """Returns the machines with labels that have only what tells them apart, beside their texts in groups."""
+    """Returns the machines with short labels, which name only the parts that differ, and with their full texts in groups."""
     unique: dict[str, pd.Series] = {}
     for row in rows:
         unique.setdefault(row["machine"], row)

@@ -1,6 +1,6 @@
 """The headline tables of README.md and of the results guide, from the results of plan `headline`.
 
-usage: headline.py RESULTS_DIR [--write PAGE]...
+usage: headline.py RESULTS_DIR [--write PAGE]... [--picture FILE.png]
 
 A page has tables between `<!-- headline NAME -->` and `<!-- /headline NAME -->`; NAME is one of TABLES. Without --write all of
 them are printed. Every number is a median over repetitions, in ms per frame of the clip; every ratio is against the best refit
@@ -13,15 +13,19 @@ import argparse
 import json
 import re
 import sys
+import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Callable, Optional
 
 import pandas as pd
 
+import canvas
+import figures
 import files
 import ratios
 import text
+from colours import looks
 from load import ResultError, Study, load
 
 AUTO_PLAN = Path(__file__).resolve().parents[1] / "experiments" / "plans" / "auto.json"
@@ -193,6 +197,20 @@ def strategies(all_cases: list[Case], rows: list[Contestant]) -> str:
     return "\n".join([*table, "", " ".join([*dict.fromkeys(remarks), facts([case])])]) + "\n"
 
 
+def picture(all_cases: list[Case], path: Path) -> None:
+    """Writes the picture of README: the frames of the table of strategies, split into phases. Those as in 2006 are left out."""
+    case = next((one for one in all_cases if one.scene == CLOTH and one.l == 10), None)
+    if case is None:
+        raise ResultError(f"{CLOTH} at l = 10 is missing: the results are not those of plan headline.")
+    runs = [case.run(who) for who in (*WHOLE, Contestant("", "leaf_slabs")) if who.leaf_size is None]
+    rows = pd.DataFrame([run.to_frame().T.assign(label=run["title"]).iloc[0] for run in runs if run is not None]).drop_duplicates("run")
+    rows = rows.infer_objects().astype({name: float for name in rows.columns if name.startswith(("middle_", "total_"))})
+    all_looks = looks(zip(rows["contestant"], rows["id"], rows["family"]))
+    with tempfile.TemporaryDirectory() as folder:
+        canvas.picture(Path(folder), "cost", "Where the time goes", "", lambda: figures.cost_split(rows, all_looks), embedded=False)
+        files.write_whole(path, (Path(folder) / "cost.png").read_bytes())
+
+
 def by_case(all_cases: list[Case]) -> str:
     """Returns the table of scenes and l: the best refit, its shares, and the others against it."""
     tuned = tuned_scenes()
@@ -245,6 +263,7 @@ def main(arguments: Optional[list[str]] = None) -> int:
     parser = argparse.ArgumentParser(prog="headline.py", description="Writes the headline tables from the results of plan headline.")
     parser.add_argument("folder", metavar="RESULTS_DIR", type=Path, help="folder with results.jsonl")
     parser.add_argument("--write", metavar="PAGE", type=Path, action="append", default=[], help="insert them into this page; repeatable")
+    parser.add_argument("--picture", metavar="FILE", type=Path, help="draw the table of strategies into this PNG file")
     options = parser.parse_args(arguments)
 
     def work() -> int:
@@ -252,7 +271,9 @@ def main(arguments: Optional[list[str]] = None) -> int:
         pages = {page: inserted(page.read_text(encoding="utf-8"), str(page), all_cases) for page in options.write}
         for page, content in pages.items():
             files.write_whole(page, content)
-        if not options.write:
+        if options.picture is not None:
+            picture(all_cases, options.picture)
+        if not options.write and options.picture is None:
             print("\n".join(f"<!-- headline {name} -->\n{table(all_cases)}" for name, table in TABLES.items()))
         return 0
 

@@ -53,7 +53,7 @@ def main(arguments: Optional[list[str]] = None) -> int:
     parser.add_argument("--title", default=explore.TITLE, help="heading of the report")
     parser.add_argument(
         "--figures", choices=("paper", "main", "all", "none"), default="paper",
-        help="figures of the paper and its claims in the page (default); beside it also those of one group per scene (main) or of every "
+        help="figures of the paper and its claims in the page (default); next to it also those of one group per scene (main) or of every "
         "group (all); or none",
     )  # fmt: skip
     parser.add_argument("--print", dest="printed", action="store_true", help="also print the tables as text")
@@ -93,7 +93,7 @@ def run(options: argparse.Namespace) -> int:
 
 @dataclass(frozen=True)
 class Made:
-    """The page, and what stands on its top."""
+    """The page, and the lines at its top."""
 
     page: Path
     sentences: list[str]

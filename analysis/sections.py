@@ -33,7 +33,7 @@ class Section:
     own: bool  #: from files that the user brought
     sizes: str  #: of the smaller versions of the scene
     groups: list[tables.Group]
-    pictures: list[Picture] = field(default_factory=list)  #: files beside the page
+    pictures: list[Picture] = field(default_factory=list)  #: files next to the page
 
 
 def sections(

@@ -35,7 +35,7 @@ class Verdict:
 
     @property
     def source(self) -> str:
-        """Returns which of both decides it: this study if it can; "" if neither does."""
+        """Returns which of the two decides it: this study if it can; "" if neither does."""
         return HERE if self.row.verdict != OPEN else BY_REFERENCE if self.reference else ""
 
     @property
@@ -75,7 +75,7 @@ class Paper:
 
 
 def paper(claims: Claims, folder: Path, reference: Path = REFERENCE) -> Paper:
-    """Adds the verdicts of the reference run, if it comes with the program and is not what the report is of."""
+    """Adds the verdicts of the reference run, if it comes with the program and is not itself the subject of the report."""
     known: dict[str, dict[str, str]] = {}
     about = ""
     file = reference / "claims.json"
@@ -175,7 +175,7 @@ TICKS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 
 @dataclass
 class Bar:
-    """One line of the chart: the advice where so much is known; places are percentages of the axis."""
+    """One line of the chart: the advice at one level of knowledge; places are percentages of the axis."""
 
     known: str
     best: Advice
@@ -193,7 +193,7 @@ class Chart:
 
 
 def chart(found: Sequence[Situation]) -> Chart:
-    """Lays out the chart; what more knowledge does not change has no line of its own."""
+    """Lays out the chart; advice that more knowledge does not change has no line of its own."""
     kept: list[tuple[Situation, list[tuple[str, Advice]]]] = []
     for one in found:
         lines: list[tuple[str, Advice]] = []

@@ -70,7 +70,7 @@ class Place:
     anchor: str
     points: list[Point]  #: by time
     curves: list[Curve]
-    fronts: dict[str, list[Point]]  #: what nobody dominates in time and error, by column; the fastest first
+    fronts: dict[str, list[Point]]  #: points that no other dominates in time and error, by column; the fastest first
     named: list[Point] = field(default_factory=list)  #: all points on a front, by time
 
     @property
@@ -188,7 +188,7 @@ class Entry:
 
     symbol: Markup  #: in the colours of the panels
     name: str
-    dials: str  #: what its curves turn, and from where to where
+    dials: str  #: the dial that its curves turn, and its range
 
 
 def legend(place: Place, looks: dict[str, tuple[str, str]]) -> list[Entry]:
@@ -317,7 +317,7 @@ def _mark(colour: str, marker: str, x: float, y: float, says: str = "", scale: f
 
 
 def _labels(place: Place, front: Sequence[Point], scale: Scale, share: Callable[[Point], float]) -> list[str]:
-    """Writes the numbers of the front, then the values at both ends of each dial, beside their marks, where they cover neither marks nor
+    """Writes the numbers of the front, then the values at both ends of each dial, next to their marks, where they cover neither marks nor
     each other; values without room are left out."""
     slow = place.slow
     taken = [(scale.x(one.time), scale.y(share(one)), 5.0, 4.0) for one in place.points]
@@ -347,7 +347,7 @@ def _labels(place: Place, front: Sequence[Point], scale: Scale, share: Callable[
 
 def _said(place: Place, front: Sequence[Point], column: str, title: str) -> str:
     told = "; ".join(f"{one.name}: {text.milliseconds(one.time)} ms, {text.percent(getattr(one, column))}" for one in front)
-    return f"{place.title}. {title} against time per frame; nobody dominates {told}."
+    return f"{place.title}. {title} against time per frame; not dominated: {told}."
 
 
 @dataclass(frozen=True)

@@ -1,18 +1,18 @@
-// A strategy that chooses among other strategies by observed properties of the scene: the number of frames
-// per segment of the flight plans, the vertex steps per frame, changes of plans, and the number of
-// candidates; the growth of boxes as trees age, with the box tests that new trees save; the work that the
-// interval join does for whole segments, beside that of a refit, by which a join is kept or left after a
-// trial; and the candidates that slabs at the leaves leave out. The choice depends on counts and plans only,
-// never on a clock, so that a run can be repeated.
+// A strategy that chooses among other strategies by observed properties of the scene: frames per segment of
+// the flight plans, vertex steps per frame, changes of plans, and candidates; the growth of boxes as trees
+// age, and the box tests that new trees save; the work of the interval join over whole segments compared with
+// a refit's, which decides after a trial whether the join stays; and the candidates that slabs at the leaves
+// leave out. The choice depends on counts and plans only, never on a clock, so that a run can be repeated.
 //
-// Each candidate has one instance from the first frame on, with its own hierarchies. This costs the memory of
-// all candidates and saves creating an instance at a change. Inactive instances do not advance.
+// Each candidate has one instance, with its own hierarchies, created with the strategy. This takes the memory
+// of all candidates, but a change of strategy creates no instance. An instance starts when it is chosen.
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/contract/registry.hpp"
-#include "core/contract/tells_work.hpp"
+#include "core/contract/reports_work.hpp"
 #include "core/families/choice/changes_of_many.hpp"
 #include "core/families/choice/observed_ageing.hpp"
 #include "core/families/choice/observed_join.hpp"
@@ -24,8 +24,8 @@ namespace kbvh {
 namespace {
 
 /// A strategy to choose, its explicitly set parameters, and its predicted cost. To add a candidate, add a
-/// line: any registered strategy that follows plan changes and needs no more foresight than the next keyframe
-/// is suitable.
+/// line: any registered strategy is suitable that follows plan changes and needs no more foresight than the
+/// next keyframe.
 struct Candidate {
   const char* id;
   std::map<std::string, std::string> params;
@@ -43,7 +43,8 @@ const std::vector<Candidate>& candidates() {
   return list;
 }
 
-/// Counts nothing itself: its counters are those of its instances, so it is no CountedStrategy.
+/// Counts nothing itself: its counters are those of its instances, so it does not derive from
+/// CountedStrategy.
 template <class S>
 class Auto final : public Strategy<S>,
                    public AnswersChanges<S>,
@@ -66,19 +67,20 @@ class Auto final : public Strategy<S>,
       runners_.push_back({&candidate, found->info.positions == PositionUse::all,
                           NestedStrategies<S>::create(*found, scene, motion, topologies, own)});
       Runner& runner = runners_.back();
-      runner.work = dynamic_cast<TellsWork*>(runner.strategy.get());
+      runner.work = dynamic_cast<ReportsWork*>(runner.strategy.get());
     }
     if (runners_.empty()) throw ConfigError("auto has nothing to choose from");
   }
 
   void reset_to(double t) override {
     for (Runner& runner : runners_) {
-      runner.strategy->reset(t);
-      runner.fresh = true;
+      runner.started = false;
       runner.frames = 0;
       runner.factor = 1;
     }
     retired_ = {};
+    changed_.clear();
+    start(runners_[0], t);
     active_ = 0;
     frame_ = chosen_at_ = 0;
     stay_ = shortest_stay;
@@ -93,7 +95,6 @@ class Auto final : public Strategy<S>,
     changes_of_many_.start_over();
     pairs_asked_ = pairs_in_frame_ = rays_asked_ = false;
     window_ = {};
-    changed_.clear();
     body_changed_.assign(this->scene_.body_count(), 0);
     seen_ = {};
     seen_.reads = steps_.reads();
@@ -103,8 +104,8 @@ class Auto final : public Strategy<S>,
     chosen_tests_ = 0;
     searched_ = {};
     saved_ = 0;
-    weighed_at_ = 0;
-    tried_ = waits_ = refits_first_ = false;
+    savings_counted_until_ = 0;
+    tried_ = waits_ = refits_first_ = joins_first_ = false;
     join_.start_over(seen_);
     slabs_.start_over(runners_[0].candidate->cost == &refit_cost, seen_);
   }
@@ -128,29 +129,24 @@ class Auto final : public Strategy<S>,
     if (active_ != last) {
       changes_of_many_.switched();
       saved_ = 0;
-      weighed_at_ = frame_;
+      savings_counted_until_ = frame_;
     }
     tried_ = active_ != last &&
              ((rebuilds() && !rebuilds(last)) || is_active(&plain_cost) || join_.outdated() || refits_first_);
+    joins_first_ = active_ != last && is_active(&join_cost);
     Runner& runner = runners_[active_];
-    if (runner.all_positions) fetch_all();
-    if (active_ == last || runner.fresh) {
-      if (window_.begins) begin_window();
+    if (active_ != last) start(runner, t);
+    if (window_.begins) begin_window();
+    if (active_ == last) {
+      if (runner.all_positions) fetch_all();
       runner.strategy->advance(t);
-    } else {
-      add(retired_, runner.strategy->counters());
-      fetch_all();
-      runner.strategy->reset(t);
-      // The instance sees the current plans, but not which bodies no longer rest.
-      if (!changed_.empty()) runner.strategy->flight_plans_changed(t, changed_);
-      if (window_.begins) begin_window();
     }
-    for (Runner& other : runners_) other.fresh = false;
     ++runner.frames;
   }
 
   QueryStatus find_candidates(double t, PairBuffer& out, const Budget& /*budget*/) override {
     const std::size_t before = out.size();
+    give_up_endless_join(t);
     // Not all candidates honour a budget.
     const QueryStatus status = runners_[active_].strategy->candidates_at(t, out, {});
     see_candidates(out.size() - before, true);
@@ -168,9 +164,10 @@ class Auto final : public Strategy<S>,
   }
 
   void find_changes(double t, Answer answer, PairBuffer& begun, PairBuffer& ended) override {
+    give_up_endless_join(t);
     changes_of_many_.find(*runners_[active_].strategy, t, answer, begun, ended);
     const PairSet& pairs = changes_of_many_.pairs(answer);
-    // Pairs that intersect stand for the candidates among which they are.
+    // Estimates the number of candidates from the pairs that intersect.
     see_candidates(pairs.size(), answer == Answer::candidates);
     touching_of_ = &pairs;
   }
@@ -179,7 +176,7 @@ class Auto final : public Strategy<S>,
     const Runner& runner = runners_[active_];
     runner.strategy->hits_at(t, query, rays, hits);
     rays_asked_ = true;
-    // Where pairs are asked, too, these tell how trees age.
+    // If pairs are asked for as well, they show how trees age.
     if (pairs_in_frame_ || runner.work == nullptr) return;
     const double tests = costs::Ageing::ray_test * double(runner.work->last_ray_tests());
     if (refits()) seen_.slab_tests = seen_.plain_tests = tests;
@@ -193,8 +190,6 @@ class Auto final : public Strategy<S>,
       changed_.push_back(change);
     }
     runners_[active_].strategy->flight_plans_changed(t, changes);
-    for (std::size_t i = 0; i < runners_.size(); ++i)
-      if (i != active_) runners_[i].fresh = false;
     changes_ = true;
   }
 
@@ -230,7 +225,8 @@ class Auto final : public Strategy<S>,
   void start_counting() override { first_fetch_ = this->sampled_.fetched(); }
   Counters counted() const override {
     Counters table = retired_;
-    for (const Runner& runner : runners_) add(table, runner.strategy->counters());
+    for (const Runner& runner : runners_)
+      if (runner.started) add(table, runner.strategy->counters());
     table[Counter::positions_fetched] = this->sampled_.fetched() - first_fetch_;
     return table;
   }
@@ -240,15 +236,17 @@ class Auto final : public Strategy<S>,
     const Candidate* candidate;
     bool all_positions;
     std::unique_ptr<Strategy<S>> strategy;
-    TellsWork* work = nullptr;  ///< the strategy, if it does
-    double factor = 1;          ///< cost over prediction, where it was found to cost more than a refit
-    bool fresh = false;         ///< in the state after `reset`
-    int frames = 0;             ///< number of frames that it answered
+    ReportsWork* work = nullptr;  ///< the strategy, if it reports its work; else null
+    double factor = 1;            ///< measured / predicted cost, if it cost more than a refit
+    bool started = false;         ///< since `reset`
+    int frames = 0;               ///< number of frames that it answered
   };
-  /// The number of frames after which the choice is reviewed within one segment, and at the start of a new
-  /// one; the latter doubles each time that the choice is confirmed.
+  /// Frames after which the choice is reviewed within a segment, and at the start of a new one. The latter
+  /// doubles each time that the choice is confirmed.
   static constexpr int longest_stay = 64, shortest_stay = 8;
-  static constexpr double forgets = 0.9;  ///< exponent of what was measured of others, at each choice
+  /// A join's first segment may take this many times the work of refits in the segment's frames.
+  static constexpr double join_trial = 8;
+  static constexpr double forgets = 0.9;  ///< at each choice, exponent of the factors measured for the others
 
   static void add(Counters& sum, const Counters& other) {
     for (const Counter peak : {Counter::list_peak, Counter::queue_peak}) {
@@ -262,7 +260,7 @@ class Auto final : public Strategy<S>,
     for (const Counters::Named& counter : other.named) sum.add(counter.name, counter.value);
   }
 
-  /// Whether trees that are only refitted answer.
+  /// Whether the active strategy only refits its trees.
   bool refits() const { return active_ == 0 || is_active(&plain_cost); }
   bool is_active(double (*cost)(const Observed&)) const { return runners_[active_].candidate->cost == cost; }
   bool is_join(std::size_t runner) const { return runners_[runner].candidate->cost == &join_cost; }
@@ -270,9 +268,9 @@ class Auto final : public Strategy<S>,
     const auto cost = runners_[runner].candidate->cost;
     return cost == &rebuilt_cost || cost == &sorted_cost;
   }
-  /// Whether a strategy that builds new trees answers.
+  /// Whether the active strategy builds new trees.
   bool rebuilds() const { return rebuilds(active_); }
-  /// Returns what a join is compared with: in trees that have aged, a refit would take long.
+  /// Returns the candidate to compare a join with: in trees that have aged, a refit would take long.
   std::size_t refit_to_compare() const { return seen_.aged > 0.5 ? builder() : 0; }
   /// Returns lbvh_drift, or the first strategy without it.
   std::size_t builder() const {
@@ -292,28 +290,27 @@ class Auto final : public Strategy<S>,
   double cost_of(std::size_t runner) const {
     return runners_[runner].factor * runners_[runner].candidate->cost(seen_);
   }
-  /// Whether the box tests and candidates of the active strategy alone cost more than a refit, whatever the
-  /// reason: those of a join where nothing was thought to meet, and in the mean of some frames those of
-  /// drift_boxes, of which one search serves many frames. Refits and new trees are compared by their
-  /// searches.
+  /// Whether box tests and candidates of the active strategy alone cost more than a refit, for any reason.
+  /// For a join over bodies that were not expected to meet, this is its own work; for drift_boxes, the mean
+  /// over some frames, because one search serves many. Refits and new trees are compared by their searches.
   bool overworked() const {
     if (is_active(&join_cost)) return !seen_.near && searched() > gain_ * refit_cost(seen_);
     return is_active(&drift_cost) && frame_ - chosen_at_ >= shortest_stay &&
            searched() > gain_ * refit_cost(seen_as_searched());
   }
-  /// Returns the mean cost of box tests and candidates of the active strategy since it was chosen last; of a
-  /// join that of the box tests of its segment.
+  /// Returns the mean cost of box tests and candidates of the active strategy since it was last chosen; for a
+  /// join, the cost of the box tests of its segment.
   double searched() const {
     using Work = costs::Work;
-    const TellsWork* work = runners_[active_].work;
+    const ReportsWork* work = runners_[active_].work;
     if (is_active(&join_cost))
       return work == nullptr
                  ? 0
                  : Work::join_box_test * double(work->last_box_tests()) / seen_.frames_per_segment;
     return Work::plain.of(0, searched_.tests, searched_.candidates) / std::max(1, frame_ - chosen_at_);
   }
-  /// Returns what was seen, with as many candidates as drift_boxes had since; a refit makes more box tests
-  /// where there are more.
+  /// Returns the observations, with the number of candidates that drift_boxes has had since; with more
+  /// candidates a refit makes more box tests.
   Observed seen_as_searched() const {
     Observed now = seen_;
     now.candidates = searched_.candidates / std::max(1, frame_ - chosen_at_) / seen_.boxed;
@@ -322,16 +319,16 @@ class Auto final : public Strategy<S>,
     now.plain_tests *= more;
     return now;
   }
-  /// Returns the strategy of least predicted cost among those that are `allowed`, or the active one where
-  /// none is cheaper by `gain`.
+  /// Returns the strategy of least predicted cost among those that are `allowed`, or the active one if none
+  /// is cheaper by `gain`.
   template <class Allowed>
   std::size_t cheapest(double gain, Allowed&& allowed) const {
     const std::size_t best = least(allowed);
     return best != none_of_them && cost_of(best) * gain < cost_of(active_) ? best : active_;
   }
-  /// Prepares the first comparison of new trees with refitted ones: in the frame after one of a refit, and by
-  /// the cheapest build. Boxes that have grown are a reason for it, even where a join is predicted to be
-  /// faster than either.
+  /// Prepares the first comparison of new trees with refitted ones: in the frame after a refit, and with the
+  /// cheapest build. Boxes that have grown justify it, even where a join is predicted to be faster than
+  /// either.
   void try_new_trees(std::size_t& best) {
     refits_first_ = rebuilds(best) && !refits() && seen_.aged <= 0.5;
     if (refits_first_)
@@ -339,22 +336,48 @@ class Auto final : public Strategy<S>,
     else if (rebuilds(best) || (is_join(best) && refits() && seen_.aged > 0.5))
       best = builder();
   }
-  /// Whether new trees by `best` have paid for their first frame before the next review: by what they would
-  /// have saved in the frames since this was asked last, or since the last change of strategy, and will save
-  /// in the next. Each frame counts as if it were like this one.
+  /// Whether new trees by `best` pay for their first frame before the next review. Adds what they would have
+  /// saved in the frames since the last call, or since the last change of strategy, and what they will save
+  /// in the next frames. Assumes that each frame is like this one.
   bool worth_a_start(std::size_t best) {
     double now = cost_of(active_);
     if (!std::isfinite(now)) now = cost_of(least([&](std::size_t runner) { return !rebuilds(runner); }));
     const double saves = std::max(0.0, now - cost_of(best));
-    saved_ += saves * (frame_ - weighed_at_);
-    weighed_at_ = frame_;
+    saved_ += saves * (frame_ - savings_counted_until_);
+    savings_counted_until_ = frame_;
     return saved_ + saves * shortest_stay > costs::Choice::start_primitive * seen_.primitives;
   }
-  /// Strategies differ in the pairs that they leave out early: only drift_boxes reports all pairs of boxes,
-  /// and shows that bodies are apart.
+  /// Starts an instance, at the beginning or when it is chosen. It sees the current plans, but does not know
+  /// which bodies no longer rest.
+  void start(Runner& runner, double t) {
+    if (runner.started) add(retired_, runner.strategy->counters());
+    if (runner.all_positions) fetch_all();
+    runner.strategy->reset(t);
+    if (!changed_.empty()) runner.strategy->flight_plans_changed(t, changed_);
+    runner.started = true;
+  }
+  /// Lets a refit answer this frame if the first join after a change of strategy would take many times the
+  /// work of a refit in all frames of the segment.
+  void give_up_endless_join(double t) {
+    if (!std::exchange(joins_first_, false) || runners_[active_].work == nullptr) return;
+    const double frame = std::max(refit_cost(seen_), costs::Work::slabs.read * seen_.reads);
+    const double most =
+        join_trial * frame * std::max(1.0, seen_.frames_per_segment) / costs::Work::join_box_test;
+    if (runners_[active_].work->searches_within(std::uint64_t(std::min(most, 1e15)) + 1)) return;
+    join_.given_up(seen_);
+    --runners_[active_].frames;
+    active_ = 0;
+    ++runners_[active_].frames;
+    start(runners_[active_], t);
+    changes_of_many_.switched();
+    window_ = {};
+    stay_ = shortest_stay;
+  }
+  /// Strategies differ in the pairs that they leave out early. Only drift_boxes reports all pairs of boxes,
+  /// and so shows that bodies are apart.
   void see_candidates(std::size_t count, bool all) {
     pairs_asked_ = pairs_in_frame_ = true;
-    const TellsWork* work = runners_[active_].work;
+    const ReportsWork* work = runners_[active_].work;
     searched_.tests += work != nullptr ? double(work->last_box_tests()) : 0;
     searched_.candidates += double(count);
     if (count != 0 || is_active(&drift_cost)) seen_.near = count != 0;
@@ -374,7 +397,7 @@ class Auto final : public Strategy<S>,
                       std::max(1, frame_), seen_);
   }
   /// Measures the work of the active strategy since the last choice, or since its window began. `whole`: a
-  /// segment ends here.
+  /// segment ends at this frame.
   void see_work(bool whole) {
     const Runner& runner = runners_[active_];
     const double frames = frame_ - chosen_at_;
@@ -385,7 +408,7 @@ class Auto final : public Strategy<S>,
       ageing_.look_at_rebuilt(runner.work->growth(), is_active(&sorted_cost), seen_);
     }
     if (rebuilds()) join_.refitted(frame_, seen_);
-    // From time to time drift_boxes may look whether bodies have parted.
+    // From time to time drift_boxes may check whether bodies have parted.
     if (frames >= longest_stay && seen_.candidates == 0) seen_.near = false;
     if (!is_active(&join_cost)) {
       if (frames >= shortest_stay) join_.forget(seen_);
@@ -393,11 +416,11 @@ class Auto final : public Strategy<S>,
       join_.joined(seen_.near ? joined_work() : searched(), joined_candidates_, frame_, seen_);
     }
   }
-  /// Returns the work of the join in a frame of its window, which is of whole segments.
+  /// Returns the work of the join per frame of its window, which consists of whole segments.
   double joined_work() const {
     using Work = costs::Work;
     const double frames = frame_ - window_.frame;
-    const TellsWork* work = runners_[active_].work;
+    const ReportsWork* work = runners_[active_].work;
     const double boxes = work != nullptr ? double(work->last_box_tests()) : 0;
     const double in_frames = Work::span_test * double(span_tests() - window_.span_tests) +
                              Work::join_triangle_test * double(frame_tests() - window_.frame_tests) +
@@ -407,11 +430,11 @@ class Auto final : public Strategy<S>,
   }
   void begin_window() { window_ = {false, frame_, span_tests(), frame_tests(), this->sampled_.fetched()}; }
   std::uint64_t span_tests() const {
-    const TellsWork* work = runners_[active_].work;
+    const ReportsWork* work = runners_[active_].work;
     return work != nullptr ? work->span_tests() : 0;
   }
   std::uint64_t frame_tests() const {
-    const TellsWork* work = runners_[active_].work;
+    const ReportsWork* work = runners_[active_].work;
     return work != nullptr ? work->frame_tests() : 0;
   }
 
@@ -430,7 +453,8 @@ class Auto final : public Strategy<S>,
       }
     const bool bounded =
         begin > -std::numeric_limits<double>::infinity() && end < std::numeric_limits<double>::infinity();
-    // The work of a segment is done when it begins: a join is not left within one, unless it is long.
+    // A join does its work for a segment at the start, so it is not left within one, unless the segment is
+    // long.
     const bool whole = bounded && begin > this->previous_time();
     if (is_active(&join_cost) && bounded && !whole && frame_ - chosen_at_ < 2 * longest_stay) return;
     const bool known = join_.known();
@@ -461,14 +485,14 @@ class Auto final : public Strategy<S>,
     const double gain = tried_ || known != join_.known() ? 1 : gain_;
     std::size_t best = cheapest(gain, [](std::size_t) { return true; });
     refits_first_ = false;
-    // This is found at the end of a segment, where a frame of a refit costs no second join.
+    // Checked at the end of a segment, where a refitted frame costs no second join.
     if (join_.outdated())
       best = refit_to_compare();
     else if (!ageing_.compared() && !rebuilds())
       try_new_trees(best);
     if (!join_.outdated() && rebuilds(best) && !rebuilds() && !worth_a_start(best))
       best = cheapest(gain, [&](std::size_t runner) { return !rebuilds(runner); });
-    // A join of a segment's last frames costs as much as that of the whole.
+    // A join over the last frames of a segment costs as much as one over the whole segment.
     waits_ = best != active_ && is_join(best) && bounded && !whole &&
              cost_of(active_) * (end - t) < join_cost(seen_) * seen_.frames_per_segment * step_;
     if (waits_) return;
@@ -481,7 +505,7 @@ class Auto final : public Strategy<S>,
   }
 
   static constexpr int none = -1;
-  /// Frames over which the work of the join is measured: from the beginning of one segment to that of
+  /// The frames over which the work of the join is measured: from the start of one segment to the start of
   /// another.
   struct Window {
     bool begins = false;  ///< before the strategy advances
@@ -498,17 +522,18 @@ class Auto final : public Strategy<S>,
   int frame_ = 0, chosen_at_ = 0, stay_ = shortest_stay;
   double step_ = 0, segment_end_ = 0;  ///< seconds
   double chosen_candidates_ = 0;       ///< number of candidates at the time of the choice
-  bool chosen_near_ = false;           ///< whether bodies met then
-  double chosen_tests_ = 0;            ///< box tests of the refitted trees in the frame before
+  bool chosen_near_ = false;           ///< whether bodies met at that time
+  double chosen_tests_ = 0;            ///< box tests of the refitted trees in the last frame
   struct Searched {
     double tests = 0, candidates = 0;
-  } searched_;          ///< since the last choice
-  double saved_ = 0;    ///< nanoseconds, see worth_a_start
-  int weighed_at_ = 0;  ///< the frame until which
-  bool tried_ = false;  ///< a strategy answers for the first time whose work decides whether it stays
+  } searched_;                     ///< since the last choice
+  double saved_ = 0;               ///< nanoseconds, see worth_a_start
+  int savings_counted_until_ = 0;  ///< frame up to which savings are in `saved_`
+  bool tried_ = false;             ///< on trial: its work decides whether the active strategy stays
   ObservedAgeing ageing_;
-  bool waits_ = false;         ///< for the next segment, to join it
-  bool refits_first_ = false;  ///< before new trees are tried
+  bool joins_first_ = false;   ///< the join answers for the first time since another strategy
+  bool waits_ = false;         ///< for the next segment, before a join is chosen
+  bool refits_first_ = false;  ///< a refit answers before new trees are tried
   ObservedJoin join_;
   double joined_candidates_ = 0;  ///< of the join's last frame
   Window window_;
@@ -516,10 +541,10 @@ class Auto final : public Strategy<S>,
   bool pairs_asked_ = false, rays_asked_ = false;  ///< since the last choice
   bool pairs_in_frame_ = false;
   bool changes_ = false;                ///< plans changed since the last frame
-  std::vector<PlanChange<S>> changed_;  ///< since `reset`, the first change of each body
+  std::vector<PlanChange<S>> changed_;  ///< the first change of each body since `reset`
   std::vector<std::uint8_t> body_changed_;
   PairBuffer touching_;                   ///< sample of the candidates of the last frame
-  const PairSet* touching_of_ = nullptr;  ///< where a choice samples them; null: they are sampled
+  const PairSet* touching_of_ = nullptr;  ///< where to sample them at a choice; null: sampled already
   ChangesOfMany<S> changes_of_many_;
   Observed seen_;
 };

@@ -1,19 +1,19 @@
-// Time-critical collision detection by the average case: a refit, and a query that follows the pairs of nodes
-// in order of the probability that their polygons intersect, until its budget of box tests or the threshold
-// ends it. The probability comes from a grid in each node's box, which says where it is filled with polygons,
-// and from the overlap of the two boxes (core/families/average/pair_probability.hpp). The answer lacks the
-// pairs that were not reached; with neither budget nor threshold it is exact.
+// Time-critical collision detection by the average case: a refit, and a query that visits pairs of nodes in
+// order of the probability that their polygons intersect, until it has used up its budget of box tests or
+// reaches the threshold. The probability is computed from the overlap of the two boxes and from a grid in
+// each box, which marks the cells that hold polygons (core/families/average/pair_probability.hpp). The answer
+// lacks the pairs that were not reached; with neither budget nor threshold it is exact.
 //
 // When it wins: at times by box tests, not by time. On a tablecloth of 16k triangles 6,400 box tests miss
-// 0.71 of the pairs, 0.59 with grids made anew every tenth frame (refresh = 10); in the order of the tree
+// 0.71 of the pairs, or 0.59 with new grids at every tenth frame (refresh = 10); in the order of the tree
 // (`bottom_up_budget`) 8,300 miss 0.69 and 21,500 miss 0.10. In shattering balls a test finds seven times as
 // many pairs.
-// But a test costs several times as much time, so at equal time the order of the tree finds more. Grids do
-// not last: after eight keyframes of a tablecloth their order of pairs is right in 0.70 instead of 0.81 of
-// all cases, and to make all of them anew costs 175 refits. The first hit (4k triangles, 2 to 4 cases each)
-// takes 3,000 instead of 12,600 box tests in swarms, as many on a tablecloth, and 44,600 instead of 5,400 in
-// shattering balls: where polygons are sparse, probabilities fall from level to level, and the queue goes
-// breadth first.
+// But a test takes several times as long, so at equal time the order of the tree finds more. Grids do not
+// last: after eight keyframes of a tablecloth they order pairs correctly in 0.70 of all cases instead of
+// 0.81, and making all grids again costs 175 refits. The first hit (4k triangles, 2 to 4 cases each) takes
+// 3,000 instead of 12,600 box tests in swarms, as many on a tablecloth, and 44,600 instead of 5,400 in
+// shattering balls: where polygons are sparse, probabilities fall from level to level, and the queue visits
+// the tree breadth first.
 #include "core/contract/registry.hpp"
 #include "core/families/average/probable_pairs.hpp"
 #include "core/families/wide/stored_hierarchy.hpp"
@@ -51,7 +51,7 @@ class AverageCase final : public StoredHierarchyStrategy<S> {
     Base::advance_to(t);
   }
 
-  /// The status counts the pairs of nodes that were not followed.
+  /// The status reports the number of pairs of nodes that were not followed.
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& budget) override {
     const std::uint64_t limit = std::min(box_tests_, budget.box_tests);
     std::uint64_t tests = 0;
@@ -121,7 +121,7 @@ class AverageCase final : public StoredHierarchyStrategy<S> {
   Distribution distribution_;
   std::vector<CellMasks<S>> grids_;  ///< [body]
   ProbablePairs<S> pairs_;
-  std::vector<LeafSlot> leaves_;  ///< pairs of leaves of `bodies_` whose primitives are to be compared
+  std::vector<LeafSlot> leaves_;  ///< leaf pairs of `bodies_` with primitives still to compare
   std::uint32_t bodies_ = 0;
 };
 
@@ -149,7 +149,7 @@ KBVH_STRATEGY(average_case) {
                      {"refresh",
                       "0",
                       {},
-                      "number of frames after which the grids are made anew; 0: never",
+                      "number of frames after which the grids are made again; 0: never",
                       0,
                       1e9,
                       Numbers::whole},

@@ -1,15 +1,15 @@
-// Bounds updated from reduced coordinates (BD-tree, James & Pai 2004): at the first frame, the motion of
-// each body is reduced to a few displacement fields ("modes", the principal components of its keyframes), and
-// each node gets the ranges of these fields below it. At a frame the box of a node is a linear function of
-// the coordinates and of their magnitudes, computed at the nodes that the query visits, in any order, in time
-// that depends on the number of modes only: no vertex is read, and no parent needs its children. What the
-// modes leave of the motion is bounded per node, too, so that boxes are valid for any motion.
+// Bounds updated from reduced coordinates (BD-tree, James & Pai 2004). At the first frame the motion of each
+// body is reduced to a few displacement fields ("modes", the principal components of its keyframes), and each
+// node gets the ranges of these fields below it. At later frames the box of a node is a linear function of
+// the coordinates and of their magnitudes. It is computed at the nodes that the query visits, in any order,
+// in time that depends on the number of modes only: no vertex is read, and no parent needs its children. The
+// motion that the modes do not capture is bounded per node, too, so that boxes are valid for any motion.
 //
-// Memory does not grow with the number of keyframes. Measured at 65k triangles, motion, update and query
-// together, over the best refit: 0.98 to 1.16 where few modes suffice (vibrating_plate, morphing_ball,
-// dented_sheet, l = 10), 32 where the bodies do not meet; 0.7 to 0.8 for large deformations (running_figures,
-// mixing_swarms), whose boxes are looser by 80 % and more. Not as published: boxes instead of spheres, in the
-// world's frame, so that rotations count as deformations.
+// Memory does not grow with the number of keyframes. Speed relative to the best refit, measured at 65k
+// triangles with motion, update and query together: 0.98 to 1.16 where few modes suffice (vibrating_plate,
+// morphing_ball, dented_sheet, l = 10), 32 where the bodies do not meet; 0.7 to 0.8 for large deformations
+// (running_figures, mixing_swarms), whose boxes are looser by 80 % and more. Differs from the publication:
+// boxes instead of spheres, in the world's frame, so that rotations count as deformations.
 #include "core/contract/registry.hpp"
 #include "core/families/blend/blended_strategy.hpp"
 #include "core/families/blend/reduced_boxes.hpp"
@@ -65,8 +65,8 @@ KBVH_STRATEGY(bd_tree) {
            {"tolerance",
             "0.0625",
             {},
-            "no more modes are taken once the rest of the motion is, in the root mean square, below "
-            "this share of the median side of the leaves' boxes; 0: all that there are",
+            "no more modes are added once the rest of the motion is, in the root mean square, below "
+            "this share of the median side of the leaves' boxes; 0: all modes are taken",
             0}},
   })};
 }

@@ -1,5 +1,5 @@
-// Binned SAH: the surface-area heuristic from the top down, which gives the best trees of this family. As
-// many box tests as `ploc` or fewer, and a somewhat longer building time: for frames that ask many
+// Binned SAH: the surface-area heuristic from the top down, which gives the best trees of this family. It
+// makes at most as many box tests as `ploc`, and takes somewhat longer to build: for frames that ask many
 // queries of one tree. `rebuild` with method=sah builds such trees, too, and takes longer.
 #include "core/contract/registry.hpp"
 #include "core/families/build/built_strategy.hpp"

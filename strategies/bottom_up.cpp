@@ -1,5 +1,5 @@
 // Bottom-up refit, the standard way to keep a hierarchy valid (van den Bergen 1997), in the fastest form
-// known to us: wide nodes as structure of arrays, over unique vertices in padded lists
+// known to us: wide nodes in a structure of arrays, each fitted to its unique vertices in padded lists
 // (core/families/wide/kernels/wide_refit.cpp). It is the usual denominator of the printed ratios.
 
 #include "core/contract/registry.hpp"
@@ -53,7 +53,7 @@ class BottomUp final : public StoredHierarchyStrategy<S>,
     shared_refit_.run(workers);
   }
 
-  /// A budget is spent in the order of one thread.
+  /// A budget is spent in single-threaded order.
   QueryStatus find_candidates(double t, PairBuffer& out, const Budget& budget) override {
     Workers& workers = this->sampled_.workers();
     if (!workers.several() || budget.box_tests != Budget{}.box_tests)

@@ -1,21 +1,22 @@
-// Bottom-up refits that are wrong on purpose, and fast at it: the shortcuts that programs take, each with a
-// dial. They show what exactness costs, and what it is worth (Z&W 2006, s.2, takes correctly rounded
-// positions and valid boxes for granted). Refit, query and triangle tests are those of the fastest exact
-// refits (`bottom_up`, and `leaf_slabs` with query = slabs); with every dial at zero (refit_every = 1, margin
-// = 0, boxes = scene or rounding = outward, positions = rounded) the answers are exact.
+// Bottom-up refits that trade exactness for speed: common shortcuts of real programs, each with a dial. They
+// show what exactness costs and what it is worth (Z&W 2006, s.2, takes correctly rounded positions and valid
+// boxes for granted). Refit, query and triangle tests are those of the fastest exact refits (`bottom_up`, and
+// `leaf_slabs` with query = slabs); with every dial at zero (refit_every = 1, margin = 0, boxes = scene or
+// rounding = outward, positions = rounded) the answers are exact.
 //
 // `reduced_refit` makes boxes at every n-th frame only, inflates them by a margin, and rounds them. Between
-// two refits boxes of nodes are stale; those of triangles are current, as in all queries here, and positions
-// are evaluated where the query reads them. `bottom_up_approximate` interpolates positions in the scalar's
-// own arithmetic, by one multiplication, instead of rounding them correctly; with tests = own the query and
-// the triangle tests read these positions, too, as programs do that have no others: it then also reports
-// pairs that do not intersect. Boxes with fewer digits are stored in the scalar, so that smaller boxes save
-// no memory here and cost a pass over them: their time is an upper bound.
+// two refits the boxes of nodes are stale; those of triangles are current, as in all queries here, and
+// positions are evaluated where the query reads them. `bottom_up_approximate` interpolates positions in the
+// scalar's own arithmetic, by one multiplication, instead of rounding them correctly. With tests = own the
+// query and the triangle tests read these positions, too, like programs that have no others; it then also
+// reports pairs that do not intersect. Boxes with fewer digits are stored in the scalar, so smaller boxes
+// save no memory here and cost an extra pass: their time is an upper bound.
 //
-// When it wins: hardly ever. Where there are contacts the time is the query's, and a margin costs more tests
-// than rarer refits save: on a tablecloth of 4k triangles (float, l = 10) the refit is 1 to 3 % of a frame,
-// and boxes of every 8th frame miss 0.3 % of the pairs. On passing spheres of 41k triangles boxes of every
-// 8th frame halve the time, positions included, and miss 79 % of the pairs (Intel Xeon, a busy machine).
+// When it wins: hardly ever. Where there are contacts most time goes to the query, and a margin costs more
+// tests than rarer refits save: on a tablecloth of 4k triangles (float, l = 10) the refit is 1 to 3 % of a
+// frame, and boxes of every 8th frame miss 0.3 % of the pairs. On passing spheres of 41k triangles boxes of
+// every 8th frame halve the time, positions included, and miss 79 % of the pairs (Intel Xeon, a busy
+// machine).
 
 #include <algorithm>
 #include <cmath>
@@ -28,8 +29,8 @@
 namespace kbvh {
 namespace {
 
-/// The dials of boxes: `boxes`, `rounding`, `refit_every`, `margin`, `query`. A derived class may have other
-/// positions.
+/// Implements the dials for boxes: `boxes`, `rounding`, `refit_every`, `margin`, `query`. A derived class may
+/// use other positions.
 template <class S, class Base>
 class ReducedBase : public SlabStrategy<S, Base> {
  public:
@@ -66,12 +67,12 @@ class ReducedBase : public SlabStrategy<S, Base> {
   }
 
  protected:
-  /// Returns the binary digits that numbers of this kind have less than the scalar.
+  /// Returns how many binary digits fewer than the scalar numbers of this kind have.
   static unsigned dropped_digits(const std::string& word) {
     const int digits = word == "float" ? 24 : word == "bfloat16" ? 8 : std::numeric_limits<S>::digits;
     return unsigned(std::numeric_limits<S>::digits - std::min(digits, std::numeric_limits<S>::digits));
   }
-  /// Returns all positions of a body that boxes are made of.
+  /// Returns all positions of a body from which boxes are made.
   virtual const S* positions_of_boxes(std::uint32_t body) { return scene_positions(body); }
   const S* scene_positions(std::uint32_t body) override {
     this->sampled_.fetch_all(body);
@@ -199,8 +200,8 @@ class BottomUpApproximate final : public ReducedBase<S, FixedPlansHierarchyStrat
     return own_tests_ ? own_[body].data() : nullptr;
   }
 
-  /// Makes x0 + u (x1 - x0) in the scalar's arithmetic, or takes the scene's positions, with the digits of
-  /// the boxes if all else reads them, too.
+  /// Computes x0 + u (x1 - x0) in the scalar's arithmetic, or takes the scene's positions. Rounds them like
+  /// the boxes if the query and the triangle tests read them, too.
   const S* make_own(std::uint32_t body) {
     std::vector<S>& out = own_[body];
     const ReduceKernels<S>& kernels = reduce_kernels<S>(this->hierarchies_[body].kernels());
@@ -218,7 +219,7 @@ class BottomUpApproximate final : public ReducedBase<S, FixedPlansHierarchyStrat
     return out.data();
   }
 
-  /// Adds a pair of triangles to the block, or decides another one at once.
+  /// Adds a pair of triangles to the block, or decides a pair of other primitives at once.
   void decide(const PrimitivePair& pair, std::size_t i, std::size_t& size) {
     const Primitives &a = this->scene_.primitives(pair.body_a), &b = this->scene_.primitives(pair.body_b);
     const auto p = a[pair.primitive_a], q = b[pair.primitive_b];
@@ -269,7 +270,7 @@ Info reduced_info() {
           {"refit_every",
            "1",
            {},
-           "number of frames after which boxes are made anew; in between they are stale",
+           "number of frames after which boxes are made again; in between they are stale",
            1,
            1e9,
            Numbers::whole},

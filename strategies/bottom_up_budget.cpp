@@ -1,5 +1,5 @@
-// Bottom-up refit with a query that stops when it has used up its work for the frame: the pairs found by then
-// are the answer (the idea of time-critical collision detection; Klein & Zachmann 2003).
+// Bottom-up refit with a query that stops when its work for the frame is used up, and answers with the pairs
+// found so far (the idea of time-critical collision detection; Klein & Zachmann 2003).
 
 #include "core/contract/registry.hpp"
 #include "core/families/wide/stored_hierarchy.hpp"
@@ -18,7 +18,7 @@ class BottomUpBudget final : public StoredHierarchyStrategy<S> {
       : Base(scene, motion, std::move(topologies), params),
         box_tests_(std::uint64_t(params.number("box_tests"))) {}
 
-  /// The status counts the work that the budget left undone.
+  /// The status reports the work that the budget left undone.
   QueryStatus find_candidates(double t, PairBuffer& out, const Budget& budget) override {
     return Base::find_candidates(t, out, {std::min(box_tests_, budget.box_tests)});
   }

@@ -1,7 +1,7 @@
-// The refit of a typical first implementation: recursion over the nodes, every leaf's box from all corners of
-// all its primitives, boxes extended point by point, and a query that recurses over pairs of nodes. It
-// accepts any topology, so its ratio to the best refit shows the effect of the code alone (`bottom_up_period`
-// in addition links its nodes by pointers).
+// The refit of a typical first implementation: it recurses over the nodes, computes every leaf's box from all
+// corners of all its primitives, extends boxes point by point, and queries by recursion over pairs of nodes.
+// It accepts any topology, so its ratio to the best refit shows the effect of the code alone
+// (`bottom_up_period` also links its nodes by pointers).
 
 #include "core/contract/registry.hpp"
 #include "core/families/wide/near_bodies.hpp"
@@ -114,8 +114,8 @@ class BottomUpRecursive final : public CountedStrategy<S>, public AnswersRays<S>
 
   void refit(Body& body, std::uint32_t id) {
     const TopologyNode node = body.topology.nodes[id];
-    // In place: naive, but not unlucky. GCC 12 copies a local box by vector loads of sides that were just
-    // stored one by one, which stalls at every node (measured separately: 1.7 times the time).
+    // Written in place: naive, but not unlucky. GCC 12 copies a local box by vector loads of sides that were
+    // just stored one by one, which stalls at every node (measured separately: 1.7 times the time).
     Box<S>& box = body.boxes[id];
     box = Box<S>{};
     if (node.is_leaf()) {
@@ -152,7 +152,7 @@ class BottomUpRecursive final : public CountedStrategy<S>, public AnswersRays<S>
     }
   }
 
-  /// Compares all primitives of one leaf with all of another; single ones have been compared as leaves.
+  /// Compares all primitives of two leaves; single ones have been compared as leaves.
   void compare(const BodyPair& pair, const Body& a, TopologyNode leaf_a, const Body& b, TopologyNode leaf_b,
                PairBuffer& out) {
     const bool single = leaf_a.count() == 1 && leaf_b.count() == 1;

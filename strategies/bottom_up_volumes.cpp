@@ -1,6 +1,6 @@
 // Bottom-up refit of any bounding volume, written once over the concept BoundingVolume
 // (core/geometry/volumes/bounding_volume.hpp): it isolates the effect of the kind of volume. With boxes it is
-// a simple refit on a stored tree; `bottom_up` is the fast one.
+// a simple refit of a stored tree; `bottom_up` is the fast one.
 
 #include "core/contract/registry.hpp"
 #include "core/families/volumes/volume_strategy.hpp"
@@ -11,7 +11,7 @@
 namespace kbvh {
 namespace {
 
-/// In the order of the volumes of BottomUpVolumes.
+/// In the same order as the volumes of BottomUpVolumes.
 const std::vector<std::string>& volume_words() {
   static const std::vector<std::string> words{"aabb", "dop14", "dop18", "dop26", "sphere", "obb"};
   return words;
@@ -44,7 +44,7 @@ KBVH_STRATEGY(bottom_up_volumes) {
       .family = "volumes",
       .citation = "Klosowski et al. 1998 (k-DOPs); Ritter 1990 (spheres); Gottschalk et al. 1996, Larsson & "
                   "Källberg 2011 (oriented boxes)",
-      // Boxes are tight, k-DOPs over polygons, too; spheres and oriented boxes are only large enough.
+      // Boxes and k-DOPs over polygons are tight; spheres and oriented boxes are only large enough.
       .tightness = Tightness::conservative,
       .declares = {.time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 1}},

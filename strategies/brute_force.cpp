@@ -1,5 +1,5 @@
-// No hierarchy: compares the box of every primitive with the box of every other. Any structure must be faster
-// than this.
+// No hierarchy: compares the box of every primitive with the box of every other. Any structure must be
+// faster.
 
 #include "core/contract/registry.hpp"
 #include "core/geometry/lane_box.hpp"

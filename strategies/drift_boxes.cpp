@@ -7,15 +7,15 @@
 // frame and no boxes below it.
 //
 // The displacements are found by reading each vertex twice (then and now, in memory order), or, in the
-// variant with a bound on steps, by one addition per body. `drift_boxes_approximate` believes in a share of
-// that bound only, so that its lists last longer than they are right.
+// variant with a bound on steps, by one addition per body. `drift_boxes_approximate` assumes only a share of
+// that bound, so it keeps its lists longer than they are valid.
 
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
 #include "core/contract/registry.hpp"
-#include "core/contract/tells_work.hpp"
+#include "core/contract/reports_work.hpp"
 #include "core/families/drift/drift_body.hpp"
 #include "core/families/drift/drift_model.hpp"
 #include "core/families/drift/drift_rays.hpp"
@@ -31,7 +31,7 @@ template <class S, class Motion>
 class DriftStrategy : public CountedStrategy<S>,
                       public AnswersRays<S>,
                       public TakesPlanChanges<S>,
-                      public TellsWork {
+                      public ReportsWork {
   using Body = DriftBody<S>;
   using Watch = typename Body::Watch;
   static constexpr bool bounded = std::is_same_v<Motion, SteppedMotion<S>>;
@@ -71,7 +71,7 @@ class DriftStrategy : public CountedStrategy<S>,
     // A body that rests again may have been moved by its own plans before.
     for (auto& rows : rows_) rows.positions_changed();
     near_bodies_.start_over();
-    // The pairs that meet at this frame, or all pairs if there are few; the next frame searches again.
+    // Lists the pairs that meet at this frame, or all pairs if there are few; the next frame searches again.
     if (near_bodies_.searches()) {
       take_near([&](std::uint32_t body) { return bodies_[body].box; });
     } else {
@@ -165,7 +165,7 @@ class DriftStrategy : public CountedStrategy<S>,
   }
 
  protected:
-  double believed_ = 1;  ///< share of the bound on steps that is taken for the whole
+  double believed_ = 1;  ///< share of the bound on steps that is assumed
 
  private:
   enum class Lists : std::uint8_t { tuned, never };
@@ -174,7 +174,7 @@ class DriftStrategy : public CountedStrategy<S>,
     return (this->scene_.moving(index) || bodies_[index].changed) && !hierarchies_[index].empty();
   }
 
-  // ---- Reads of a frame
+  // ---- Reads per frame
 
   void observe(std::uint32_t index, double last, double t) {
     Body& body = bodies_[index];
@@ -239,11 +239,11 @@ class DriftStrategy : public CountedStrategy<S>,
     plans_changed_ = false;
     if (!valid) change_state();
   }
-  /// Makes boxes anew, until lists are to be tried again.
+  /// Makes new boxes at every frame until lists are to be tried again.
   void advance_plain() {
     plans_changed_ = false;
     if (--plain_left_ > 0) {
-      // Remembers the frame before lists are tried again, so that there is a motion to judge by.
+      // Remembers the frame before lists are tried again, so that there is a motion to measure.
       for (std::uint32_t index = 0; index < bodies_.size(); ++index) {
         if (!bodies_[index].near || bodies_[index].watch == Watch::nothing) continue;
         make_boxes(index);
@@ -329,8 +329,8 @@ class DriftStrategy : public CountedStrategy<S>,
     }
   }
 
-  /// Computes the actual boxes of bodies that are near only if they moved as far as possible. Returns whether
-  /// there were any.
+  /// Computes the actual boxes of bodies that would only be near if they moved as far as possible. Returns
+  /// whether there were any.
   bool take_late_boxes() {
     bool any = false;
     for (std::uint32_t index = 0; index < bodies_.size(); ++index) {
@@ -344,8 +344,8 @@ class DriftStrategy : public CountedStrategy<S>,
     return any;
   }
 
-  /// Returns the largest `step_of` of all pairs of bodies, or of each body with an equal one, which is no
-  /// less.
+  /// Returns the largest `step_of` over all pairs of bodies, or, as a bound, over each body paired with its
+  /// equal.
   double step() const {
     double largest = 0;
     if (near_bodies_.searches())
@@ -362,7 +362,7 @@ class DriftStrategy : public CountedStrategy<S>,
     body.set_margin(may_move(index) ? 1.0625 * period_ : 0);
   }
 
-  /// Finds bodies that may meet while they keep to their margins.
+  /// Finds bodies that may meet while they stay within their margins.
   void find_near() {
     take_near([&](std::uint32_t body) { return bodies_[body].swept(); });
     for (Body& body : bodies_) body.near = false;
@@ -400,7 +400,7 @@ class DriftStrategy : public CountedStrategy<S>,
 
   /// Appends the candidates of two bodies from their list; returns the box tests made.
   std::uint64_t read(const NearPairs<S>& lists, const BodyPair& pair, PairBuffer& out) {
-    // At the frame of the search the list begins with exactly the overlapping pairs.
+    // At the frame of the search the list starts with exactly the overlapping pairs.
     const double fraction = frames_ == 0 ? 0 : used_reach(bodies_[pair.first], bodies_[pair.second]);
     if (!checks_ || frames_ == 0) {
       lists.read(fraction, out);
@@ -460,7 +460,7 @@ class DriftStrategy : public CountedStrategy<S>,
   NearBodies near_bodies_;
   std::vector<std::uint32_t> near_pairs_;  ///< of bodies: indices into the scene's, ascending
   std::vector<std::uint8_t> pair_is_near_;
-  std::vector<NearPairs<S>> lists_of_;  ///< [near pair], and more if there were more before
+  std::vector<NearPairs<S>> lists_of_;  ///< [near pair]; never shrinks
   NearWork<S> work_;
   WideQuery<S> query_{this->scene_, this->sampled_};
   DriftRays<S> rays_{this->scene_, this->sampled_};
@@ -486,7 +486,7 @@ class DriftBoxesBounded final : public DriftStrategy<S, SteppedMotion<S>> {
   using DriftStrategy<S, SteppedMotion<S>>::DriftStrategy;
 };
 
-/// Believes in less motion than there is.
+/// Assumes less motion than there is.
 template <class S>
 class DriftBoxesApproximate final : public DriftStrategy<S, SteppedMotion<S>> {
   using Base = DriftStrategy<S, SteppedMotion<S>>;

@@ -1,14 +1,13 @@
-// Refit until the tree has drifted, then rebuild (Lauterbach, Yoon & Manocha 2006). A rebuild here sorts
-// the primitives by medians into the leaves that exist, so that nothing is allocated and nodes stay where
-// they are. By default a tree is rebuilt when its queries have made as many box tests beyond those of a
-// new tree as a rebuild is worth: where bodies are apart, an old tree costs nothing, and stays.
+// Refit until the tree has drifted, then rebuild (Lauterbach, Yoon & Manocha 2006). A rebuild here sorts the
+// primitives by medians into the existing leaves, so that nothing is allocated and nodes stay in place. By
+// default a tree is rebuilt when its queries have made as many box tests beyond those of a new tree as a
+// rebuild is worth: where bodies are apart, an old tree costs nothing, and stays.
 //
-// When it wins: against a refit, wherever a tree ages within a clip and queries feel it (plan `ageing`).
-// Where nothing ages it costs what a refit costs. A frame that rebuilds takes longest: `spread` divides
-// its sort among several frames, but queries meet the old tree meanwhile, and in scenes that age within a
-// few frames that costs more than it saves. Where a tree lasts longer, this is faster than
-// `lbvh_drift`, whose builds take an eighth of the time, but whose refits and searches take longer (plan
-// `auto`, l = 10).
+// When it wins: against a refit, wherever a tree ages within a clip and queries notice it (plan `ageing`).
+// Where nothing ages it costs as much as a refit. A frame that rebuilds takes longest: `spread` divides its
+// sort among several frames, but queries meet the old tree meanwhile, and in scenes that age within a few
+// frames that costs more than it saves. Where a tree lasts longer, this is faster than `lbvh_drift`, whose
+// builds take an eighth of the time, but whose refits and searches take longer (plan `auto`, l = 10).
 
 #include "core/contract/registry.hpp"
 #include "core/families/restructure/leaf_strategy.hpp"
@@ -17,7 +16,7 @@
 namespace kbvh {
 namespace {
 
-/// What says that a tree has drifted.
+/// The measure of how far a tree has drifted.
 enum class Measure : std::uint8_t {
   work,     ///< box tests of the queries beyond those of the new tree
   surface,  ///< surfaces of its boxes over that of the root
@@ -74,7 +73,7 @@ class DriftRebuild final : public LeafStrategy<S> {
     if (measure_ == Measure::surface) fresh_[index] = surface_ratio(hierarchy);
   }
 
-  /// Sorts for as long as `work` lasts. Returns whether the tree is a new one.
+  /// Sorts for as long as `work` lasts. Returns whether the new tree is complete.
   bool sort(std::uint32_t index, std::uint64_t work) {
     if (!this->bodies_[index].contents.sort_in_parts(
             this->hierarchies_[index], this->scene_.primitives(index), this->sampled_.positions(index), work))
@@ -94,7 +93,7 @@ class DriftRebuild final : public LeafStrategy<S> {
     return ratio > drift_ * fresh;
   }
 
-  /// Returns the work of a sort: its items times its binary levels.
+  /// Returns the work of a sort: the number of items times the number of binary levels.
   static std::uint64_t work_of(const Topology& topology) {
     std::uint64_t levels = 1;
     for (std::size_t leaves = topology.primitives.size() / topology.leaf_size; leaves > 1; leaves /= 2)
@@ -109,7 +108,7 @@ class DriftRebuild final : public LeafStrategy<S> {
   double drift_, price_;
   std::uint64_t frames_;
   bool sorted_at_start_;
-  std::vector<double> fresh_;  // [body]: surface ratio of the tree when it was new, where that is the measure
+  std::vector<double> fresh_;  // [body]: the new tree's surface ratio, with Measure::surface
   std::uint64_t rebuilds_ = 0;
 };
 
@@ -129,8 +128,8 @@ KBVH_STRATEGY(drift_rebuild) {
           {{"measure",
             "work",
             {"work", "surface"},
-            "what says that a tree has drifted: the box tests of queries beyond those when it was "
-            "new, summed over frames; or the surfaces of all boxes over that of the root"},
+            "the measure of a tree's drift: the box tests of queries beyond those when it was new, "
+            "summed over frames; or the surfaces of all boxes over that of the root"},
            {"price",
             "100",
             {},

@@ -1,6 +1,6 @@
-// The tree of game engines: every primitive has a box that is larger than needed, and is removed from the
-// tree and inserted anew when it leaves that box; rotations keep the tree good. Its work follows what moves:
-// a body at rest costs a look at each box, a body of which all moves costs an insertion for each primitive.
+// The tree of game engines: every primitive has a box that is larger than needed. When it leaves that box, it
+// is removed from the tree and inserted again; rotations keep the tree good. The work follows the motion: a
+// body at rest costs one check per box, a body that moves as a whole costs an insertion per primitive.
 
 #include "core/families/restructure/dynamic_tree.hpp"
 #include "core/base/median.hpp"
@@ -13,7 +13,7 @@
 namespace kbvh {
 namespace {
 
-/// One body: the tree over enlarged boxes, and the tight ones of the current frame.
+/// One body: the tree over enlarged boxes, and the tight boxes of the current frame.
 template <class S>
 struct DynamicBody {
   DynamicTree<S> tree;
@@ -144,7 +144,7 @@ class Dynamic final : public BuiltEachFrame<S, DynamicBody<S>>, public AnswersRa
     this->count_build(index);
     this->count_.add(Counter::nodes_visited, body.tree.visited() - before);
   }
-  /// Returns a box with a margin on every side, and room for some steps like the last one.
+  /// Returns a box with a margin on every side, and with room for some more steps like the last one.
   Box<S> enlarged(const Box<S>& now, const Box<S>& last, S margin) const {
     Box<S> box;
     for (int axis = 0; axis < 3; ++axis) {

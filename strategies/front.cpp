@@ -1,17 +1,17 @@
 // A front of the bounding volume test tree (Li & Chen 1998; Ehmann & Lin 2001; Tang et al. 2009), between
 // hierarchies that are refitted at every frame: the pairs of nodes that overlapped at the last frame, from
 // which the next one descends or climbs (core/families/front/pair_front.hpp). Needs no foresight. One sweep
-// compares all children of a pair of wide nodes, the disjoint ones among them, so the front saves no box
+// compares all children of a pair of wide nodes, including the disjoint ones, so the front saves no box
 // tests; it saves the stack, and branches that depend on which boxes overlap.
 //
-// It is a declared baseline. It refits every box at every frame and knows nothing of the future; that its
-// query remembers the last frame is no foresight, and a best refit that leaves out a refit flatters the
-// others.
+// It is a declared baseline. It refits every box at every frame and knows nothing of the future. Its query
+// remembers the last frame, but that is no foresight, and excluding a refit from the best refit would flatter
+// the others.
 //
-// When it wins: not seen yet. On the coherent cloth that was tried it is about as fast as `bottom_up`; plan
-// `kinetic` has it beside the separation list. Where few pairs of nodes change from frame to frame, the
-// traversal is a small part of a query; the rest is pairs of leaves and triangles, which a front leaves as
-// they are.
+// When it wins: not observed yet. On the coherent cloth that was tried it is about as fast as `bottom_up`;
+// plan `kinetic` compares it with the separation list. Where few pairs of nodes change from frame to frame,
+// the traversal is a small part of a query; the rest is pairs of leaves and triangles, which a front does not
+// change.
 #include "core/contract/registry.hpp"
 #include "core/families/front/pair_front.hpp"
 #include "core/families/wide/stored_hierarchy.hpp"

@@ -1,9 +1,9 @@
-// A uniform grid with hashed cells, without a hierarchy, made anew for each two bodies and frame by a
-// counting sort. A box is entered once, into the cell of its lower corner, so that no pair is found twice;
-// boxes much larger than most have coarser grids of their own. Only boxes that meet the box of the other body
-// take part.
+// A uniform grid with hashed cells, without a hierarchy: built again for each pair of bodies and each frame
+// by a counting sort. A box is entered once, into the cell of its lower corner, so that no pair is found
+// twice; boxes much larger than most have coarser grids of their own. Only boxes that meet the box of the
+// other body take part.
 //
-// When it wins: not decided. Where bodies mix or fly apart it is a rival of `lbvh` and `sweep` and far ahead
+// When it wins: undecided. Where bodies mix or fly apart it competes with `lbvh` and `sweep` and is far ahead
 // of a refit; plan `ageing` compares them. A refit wins by far where neighbours stay neighbours, as on cloth.
 #include "core/families/grid/hash_grid.hpp"
 

@@ -11,7 +11,7 @@
 namespace kbvh {
 namespace {
 
-/// The update of a subtree that a query enters.
+/// How a subtree is updated when a query enters it.
 enum class Below : std::uint8_t {
   subtree,   ///< refitted as a whole, bottom-up
   top_down,  ///< one node at a time, each child's box from all vertices below it
@@ -40,7 +40,7 @@ struct LazyBody {
   std::vector<std::uint32_t> roots;    // roots of the subtrees that wait for a query
   std::vector<std::uint32_t> above;    // all nodes above them, children first
   std::vector<std::uint32_t> root_of;  // of each node at or below the cut
-  Lists<VertexRun> vertices;           // unique vertices below a node, where its box is computed from them
+  Lists<VertexRun> vertices;           // unique vertices below a node whose box is computed from them
   std::vector<std::uint32_t> reads;    // number of these vertices
   Lists<NodeRange> below;              // of each root: its descendants, children first
   std::vector<std::uint32_t> boxes_below, reads_below;  // of each root: cost of refitting it with `below`
@@ -142,7 +142,7 @@ class Hybrid final : public StoredHierarchyStrategy<S> {
     }
     // Half of the levels, leaves included.
     const std::uint32_t cut = levels_ == "auto" ? (deepest + 2) / 2 : std::uint32_t(std::stoul(levels_));
-    // A root that is a leaf has its box in the only node's row.
+    // If the root is a leaf, its box is in the only node's row.
     const bool leaf_only = !hierarchy.empty() && hierarchy.topology().nodes[0].is_leaf();
     for (std::uint32_t n = 0; n < nodes && !leaf_only; ++n) {
       const WideNode& node = arrays.nodes[n];
@@ -176,7 +176,7 @@ class Hybrid final : public StoredHierarchyStrategy<S> {
     auto& hierarchy = this->hierarchies_[index];
     LazyBody<S>& body = bodies_[index];
     const Topology& topology = hierarchy.topology();
-    // The topology's leaves below each wide node: contiguous, because they are laid out left to right.
+    // The topology's leaves below each wide node are contiguous, because they are laid out left to right.
     std::vector<NodeRange> range(topology.size());
     std::vector<std::uint32_t> source(hierarchy.node_count(), none);
     for (std::uint32_t i = topology.size(); i-- > 0;) {
@@ -252,7 +252,7 @@ class Hybrid final : public StoredHierarchyStrategy<S> {
     this->count_.add(Counter::vertex_reads, body.reads_above);
   }
 
-  /// Computes the boxes of a node's children, and with `Below::subtree` of everything below them.
+  /// Computes the boxes of a node's children; with `Below::subtree`, of everything below them, too.
   void make_current(std::uint32_t index, std::uint32_t node) {
     auto& hierarchy = this->hierarchies_[index];
     LazyBody<S>& body = bodies_[index];

@@ -1,7 +1,7 @@
-// Implicit tree: primitives in the order of a space-filling curve are cut into full leaves and full
-// nodes, so that the shape of the tree is known before the frame. The Hilbert curve makes up in part for
-// cuts that ignore the gaps between bodies. Somewhat slower than `lbvh`, with less memory: for scenes
-// where memory counts, or where leaves must keep their number.
+// Implicit tree: primitives in the order of a space-filling curve are cut into full leaves and full nodes, so
+// that the shape of the tree is known before the frame. The Hilbert curve partly makes up for cuts that
+// ignore the gaps between bodies. Somewhat slower than `lbvh`, with less memory: for scenes where memory
+// counts, or where the number of leaves must not change.
 #include "core/contract/registry.hpp"
 #include "core/families/build/built_strategy.hpp"
 #include "core/families/build/curve_builders.hpp"

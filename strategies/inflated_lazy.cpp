@@ -1,11 +1,12 @@
 // Inflated boxes, updated lazily (Mezger, Kimmerle & Etzmuss 2003): leaf boxes exceed their vertices by a
-// margin, and stay unchanged until a vertex may have moved through it. With a bound on the motion of a body
-// no vertex is read before the margin can have been used up, and no position is evaluated: most frames cost
-// one addition. Without such a bound every frame reads every vertex to find the boxes that vertices left.
+// margin, and stay unchanged until a vertex may have moved through it. If the motion of a body is bounded, no
+// vertex is read and no position evaluated before the margin can have been used up: most frames cost one
+// addition. Without a bound every frame reads every vertex to find the boxes that vertices have left.
 //
-// A body has one margin, of some steps and four roundings of its largest coordinate. So it takes more than 20
-// times the box tests of `bottom_up` where boxes of bodies are apart by less than two margins: sheets that
-// lie over each other without a contact, and bodies far from the origin or with one vertex far away.
+// A body has one margin, the sum of some steps and four roundings of its largest coordinate. It therefore
+// takes more than 20 times the box tests of `bottom_up` where the boxes of bodies are less than two margins
+// apart: sheets that lie over each other without a contact, and bodies far from the origin or with one vertex
+// far away.
 
 #include <algorithm>
 #include <cmath>
@@ -122,7 +123,7 @@ class InflatedLazy final : public StoredHierarchyStrategy<S> {
     return status;
   }
 
-  /// The displacement so far stays bounded; from the stored position on, rounding errors start anew.
+  /// The displacement so far stays bounded; rounding errors start again from the stored position.
   void follow_plans(double /*t*/, std::span<const PlanChange<S>> changes) override {
     for (const PlanChange<S>& change : changes) bodies_[change.body].changed = true;
     for (Body& body : bodies_)
@@ -174,16 +175,16 @@ class InflatedLazy final : public StoredHierarchyStrategy<S> {
                          0,
                          0};
     if (stay == WhichStay::inside_margin) {
-      // A body that is checked at every frame recomputes only the boxes that vertices left: it uses the full
-      // margin. A body that can skip frames skips more if all boxes have nearly their whole margin; resting
-      // parts stay unchanged in any case.
+      // A body that is checked at every frame recomputes only the boxes that vertices have left: it uses the
+      // full margin. A body that can skip frames skips more if all its boxes have nearly their whole margin.
+      // Resting parts stay unchanged in either case.
       const S used = bounded_ ? body.margin / 32 : body.margin;
       state.keep_from = body.margin - used;
       state.keep_to = body.margin + used;
     }
     wide_inflate_kernels<S>(hierarchy.kernels()).of(hierarchy.topology().width)(state);
     if (!bounded_) {
-      // The largest approach of a vertex to a side in one frame.
+      // The largest approach of any vertex to a side in one frame.
       const double room_before = double(state.room_before);
       if (stay == WhichStay::inside_margin) body.step = std::max(0.0, body.room - room_before);
     }
@@ -228,22 +229,23 @@ class InflatedLazy final : public StoredHierarchyStrategy<S> {
     if (kind_ == MarginKind::tuned) margin = margin_for(body, best_steps(index));
     return S(std::min(margin, double(admissible_magnitude<S>)));
   }
-  /// Returns a margin that lasts for `steps` steps, including roundings and the tolerance of `check_margins`.
+  /// Returns a margin for `steps` steps, roundings and the tolerance of `check_margins`.
   static double margin_for(const Body& body, double steps) {
     return steps == 0 ? 0 : (steps * body.step + 4 * body.rounding) * (1 + 1.0 / 16);
   }
 
-  // The tuned margin weighs the cost of a check against the query's cost for larger boxes, both by counts, so
-  // that it does not depend on a machine or its load. A margin of k steps needs one check in k + 1 frames.
-  // Where surfaces of leaves with median side a meet, boxes that are larger by m on every side cost about (1
-  // + m / a)^2 as much to query, and 1 + 0.4 m / a as many tests (measured on sheets; the rest are leaves
-  // opened in vain). Among many small bodies a margin also adds neighbours, in proportion to the growth of
-  // the body's box, and a body without contact at the last query may then have some.
+  // The tuned margin weighs the cost of a check against the extra query cost of larger boxes. Both are
+  // counts, so the margin does not depend on a machine or its load. A margin of k steps needs one check in k
+  // + 1 frames. Where surfaces of leaves with median side a meet, boxes that are larger by m on every side
+  // cost about (1 + m / a)^2 as much to query, and 1 + 0.4 m / a as many tests (measured on sheets; the
+  // remaining cost is leaves opened in vain). Among many small bodies a margin also adds neighbours, in
+  // proportion to the growth of the body's box, so a body without contact at the last query may then have
+  // some.
 
   using Cost = costs::InflatedBoxes;
 
-  /// Returns the cost of a check, in box tests. Positions count only if the query would not evaluate them all
-  /// anyway. A check that is due at every frame only costs its writes.
+  /// Returns the cost of a check, in box tests. Positions count only if the query would not evaluate all of
+  /// them anyway. A check that is due at every frame costs only its writes.
   double check_cost(std::uint32_t index) const {
     const double each = !bounded_                        ? Cost::writing
                         : bodies_[index].query_takes_all ? Cost::reading
@@ -271,8 +273,7 @@ class InflatedLazy final : public StoredHierarchyStrategy<S> {
     }
     return best;
   }
-  /// Returns whether the last query lost more to the current margin, compared with the best margin, than a
-  /// check costs.
+  /// Returns whether, compared with the best margin, the current one cost the last query more than a check.
   bool too_large(std::uint32_t index) const {
     const Body& body = bodies_[index];
     if (!(body.leaf_size > 0)) return false;

@@ -1,16 +1,21 @@
 // One time-parametrised traversal per segment of the flight plans, over boxes that are linear in time, yields
 // the pairs of primitives that come near each other in the segment, with their times; frames are read from
-// it. Prior art and the differences to it: core/adr/0010-prior-art-of-answering-intervals.md. Bodies of
-// triangles are compared by slabs of leaves first (core/adr/0014-slabs-of-leaves.md): what a slab separates
-// throughout the segment is no pair.
+// these. Prior art, and how this differs from it: core/adr/0010-prior-art-of-answering-intervals.md. Bodies
+// of triangles are first compared by slabs of leaves (core/adr/0014-slabs-of-leaves.md): what a slab
+// separates throughout the segment is no pair.
 //
 // Where plans change at run time, the segment is kept: leaves with a changed vertex, the boxes above them,
-// and the pairs of changed primitives are made anew. The length of segments follows the rate of changes. This
-// pays while few leaves change: with 420 changed vertices a frame at the corner of a cloth of 65k triangles
-// (1 % of all leaves), candidates take half of the time of the best refit, and with a new segment at each
-// change twice the time. It does not pay where the changes are where the contacts are: with 163 changes a
-// frame on two spheres of 40k triangles, a quarter of all pairs are joined anew at each frame, and the refit
+// and the pairs of changed primitives are computed again. The length of segments follows the rate of changes.
+// This pays while few leaves change: with 420 changed vertices per frame at the corner of a cloth of 65k
+// triangles (1 % of all leaves), candidates take half the time of the best refit, and twice its time with a
+// new segment at each change. It does not pay where the changes occur at the contacts: with 163 changes per
+// frame on two spheres of 40k triangles, a quarter of all pairs are joined again at each frame, and the refit
 // is twice as fast.
+//
+// Boxes linear in time exceed those of a refit by a few roundings of their coordinates. Where gaps and
+// triangles are no larger than these roundings, the join lists far more pairs than a refit finds: nearly all
+// pairs where two sheets of unit size lie 0.1 apart at 1e6 in float, whose numbers are 0.06 apart there.
+// `auto` gives up such a join.
 
 #include <algorithm>
 #include <limits>
@@ -18,7 +23,7 @@
 #include "core/base/cost_constants.hpp"
 #include "core/base/pacer.hpp"
 #include "core/contract/registry.hpp"
-#include "core/contract/tells_work.hpp"
+#include "core/contract/reports_work.hpp"
 #include "core/families/linear/interval_join.hpp"
 #include "core/families/linear/join_changes.hpp"
 #include "core/families/linear/linear_bounds.hpp"
@@ -49,7 +54,7 @@ struct Joins {
 struct WorkAhead {
   enum class Stage : std::uint8_t { nothing, bounds, joins, answers, done };
   Stage stage = Stage::nothing;
-  std::size_t join = 0;  ///< the next one
+  std::size_t join = 0;  ///< the next join
   bool begun = false;    ///< work on that join has begun
   bool joins_begun = false;
   Pacer pacer;
@@ -57,7 +62,7 @@ struct WorkAhead {
 };
 
 /// With foresight of the whole clip the next segment's answer is computed during the current one, a part at
-/// each frame; otherwise at the first frame of the segment.
+/// each frame; otherwise all of it at the first frame of the segment.
 template <class S, Foresight F>
 class IntervalJoinStrategy final : public CountedStrategy<S>,
                                    public AnswersSelfPairs,
@@ -65,7 +70,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S>,
                                    public AnswersSweeps<S>,
                                    public AnswersRays<S>,
                                    public TakesPlanChanges<S>,
-                                   public TellsWork {
+                                   public ReportsWork {
   static constexpr bool works_ahead = F == Foresight::whole_clip;
   using Motion = MotionView<F, S>;
 
@@ -120,7 +125,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S>,
     if constexpr (works_ahead) make_bounds_ahead();
   }
 
-  /// With span tests the candidates exclude pairs that are certainly apart, and begin with those that
+  /// With span tests the candidates exclude pairs that are certainly apart, and start with those that
   /// certainly intersect.
   QueryStatus find_candidates(double t, PairBuffer& out, const Budget& /*budget*/) override {
     const float fraction = float(bounds_.fraction(t));
@@ -143,8 +148,8 @@ class IntervalJoinStrategy final : public CountedStrategy<S>,
     return {};
   }
 
-  /// Without span tests the triangles of all candidates are tested at every frame, and a comparison costs
-  /// little beside the tests.
+  /// Without span tests the triangles of all candidates are tested at every frame; compared with these tests,
+  /// a comparison costs little.
   void find_changes(double t, Answer answer, PairBuffer& begun, PairBuffer& ended) override {
     if (answer == Answer::pairs && !all_by_spans_) return this->compare_answers(t, answer, begun, ended);
     const float fraction = float(bounds_.fraction(t));
@@ -178,7 +183,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S>,
     pairs.insert(pairs.end(), to_test_.begin(), to_test_.end());
   }
 
-  /// Follows rays in the boxes of the segment, interpolated at t where rays read them.
+  /// Follows rays through the boxes of the segment, interpolated at t where rays read them.
   void find_hits(double t, RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits) override {
     if (std::exchange(ray_boxes_are_old_, false)) {
       ray_stale_.resize(bounds_.body_count());
@@ -192,7 +197,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S>,
 
   void prepare_sweep(double /*t*/) override {
     ray_boxes_are_old_ = true;
-    if (plans_changed_) return;  // lines may have no end: the sweep's own ends are known only when it is over
+    if (plans_changed_) return;  // lines may have no end; the sweep's end is known only afterwards
     bounds_.enter();
     changes_.leave_segment(parts());
     ahead_ = {};
@@ -218,7 +223,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S>,
     }
   }
 
-  /// Keeps the segment, if possible; its joins are repaired when they are read.
+  /// Keeps the segment if possible; the next read repairs its joins.
   void follow_plans(double /*t*/, std::span<const PlanChange<S>> changes) override {
     plans_changed_ = ray_boxes_are_old_ = true;
     ahead_ = {};
@@ -231,13 +236,26 @@ class IntervalJoinStrategy final : public CountedStrategy<S>,
     return bounds_.audit_view(body, this->time());
   }
 
-  /// Of the joins of the current segment, for all its frames.
+  /// Counts the joins of the current segment, for all its frames.
   std::uint64_t last_box_tests() const override {
     std::uint64_t tests = 0;
     for (const IntervalJoin<S>& one : now_.joins) tests += joined_ ? one.tests() : 0;
     return tests;
   }
 
+  bool searches_within(std::uint64_t most) override {
+    for (std::size_t i = 0; !joined_ && i < now_.joins.size(); ++i) {
+      IntervalJoin<S>& one = now_.joins[i];
+      one.start(bounds_.segment(), this->scene_, bodies_of_join(bounds_.segment(), i),
+                IntervalJoin<S>::leaf_pairs_at_once);
+      const bool whole = one.step(most);
+      this->count_.add(Counter::box_tests, one.tests());
+      if (!whole) return false;
+      most -= std::min(most, one.tests());
+    }
+    if (!joined_) start_reading();
+    return true;
+  }
   std::uint64_t frame_tests() const override { return this->triangle_stats_.tests; }
   std::uint64_t span_tests() const override {
     std::uint64_t tests = 0;
@@ -276,7 +294,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S>,
   using Stage = WorkAhead::Stage;
   using Cost = costs::JoinAhead;
 
-  /// More pairs of bodies than this are joined together: a separate join takes some kilobytes.
+  /// With more pairs of bodies than this, they are joined together: a separate join takes some kilobytes.
   static constexpr std::size_t most_joins = 16;
 
   /// Keeps the pairs that intersect at the frame.
@@ -336,9 +354,13 @@ class IntervalJoinStrategy final : public CountedStrategy<S>,
     for (std::size_t i = 0; i < now_.joins.size(); ++i) {
       now_.joins[i].join(bounds_.segment(), this->scene_, bodies_of_join(bounds_.segment(), i),
                          this->sampled_.workers());
-      if (by_spans_[i]) now_.answers[i].start(now_.joins[i]);
       this->count_.add(Counter::box_tests, now_.joins[i].tests());
     }
+    start_reading();
+  }
+  void start_reading() {
+    for (std::size_t i = 0; i < now_.joins.size(); ++i)
+      if (by_spans_[i]) now_.answers[i].start(now_.joins[i]);
     joined_ = true;
     bounds_.clear_changed();
   }
@@ -384,7 +406,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S>,
       ahead_.stage = Stage::nothing;
     ahead_.done += std::clamp(wanted, 0.0, Cost::node * double(bounds_.nodes_of_segment()));
   }
-  /// Brings the work on joins and answers ahead to a share of the whole; from 1 on, to its end.
+  /// Brings the work on joins and answers ahead to a share of the whole; a share of 1 or more completes it.
   void join_ahead(const LinearSegment<S>& segment, double share) {
     constexpr std::size_t leaf_pairs = 128, tests_at_once = 4096, answers_at_once = 256;
     const double wanted = share >= 1 ? std::numeric_limits<double>::infinity() : share * all_work();
@@ -414,12 +436,12 @@ class IntervalJoinStrategy final : public CountedStrategy<S>,
 
   Motion motion_;
   LinearBounds<S> bounds_;
-  bool together_;  ///< pairs of bodies: by_spans_[0] are the decidable ones, [1] the others
+  bool together_;  ///< pairs of bodies: by_spans_[0]: the decidable ones, [1]: the others
   Joins<S> now_, next_;
   WorkAhead ahead_;
   double before_ = 0;                         ///< time of the preceding frame
-  std::vector<IntervalJoin<S>> sweeps_;       ///< the same for contacts, after the first request
-  std::optional<SweptHierarchies<S>> swept_;  ///< the same after changes of plans
+  std::vector<IntervalJoin<S>> sweeps_;       ///< for contacts, after the first request
+  std::optional<SweptHierarchies<S>> swept_;  ///< for contacts after changes of plans
   WideQuery<S> query_;
   LinearRays<S> rays_{this->scene_, this->sampled_};
   std::vector<std::vector<std::uint8_t>> ray_stale_;  ///< [body][wide node], from the first rays on

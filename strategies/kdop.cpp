@@ -1,5 +1,5 @@
 // Bottom-up refit of k-DOPs with 14, 18 or 26 sides, by SIMD: the lanes of a vector are the sides of one
-// node, which lie next to each other, so that a node takes a few instructions in the refit and in the query.
+// node. They lie next to each other, so a node takes a few instructions in the refit and in the query.
 #include "core/contract/registry.hpp"
 #include "core/families/volumes/dop_hierarchy.hpp"
 #include "core/families/volumes/volume_strategy.hpp"
@@ -30,7 +30,7 @@ KBVH_STRATEGY(kdop) {
       .title = "k-DOP refit",
       .family = "volumes",
       .citation = "Klosowski et al. 1998",
-      .tightness = Tightness::conservative,  // by the margins of roundings
+      .tightness = Tightness::conservative,  // because of the margins for roundings
       .declares = {.time_budget = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 4}},
       .parameters = {{"sides", "18", {"14", "18", "26"}, "sides of every node's k-DOP"}},

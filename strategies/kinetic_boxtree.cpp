@@ -2,8 +2,8 @@
 // planes; all other sides are inherited. The tree is valid at every time and updated only at events.
 // Degenerated parts can be rebuilt. Queries compute boxes on demand, many at once (BoxTreeRows).
 //
-// As in the paper, a certificate's search may read all nodes. It does where no node owns a side, as of equal
-// boxes, so that inserting n of them takes quadratically many steps.
+// As in the paper, the search for a certificate may read all nodes. It does so where no node owns a side, as
+// in a tree of equal boxes: inserting n of them takes quadratically many steps.
 
 #include <numeric>
 
@@ -195,7 +195,7 @@ class KineticBox final : public CountedStrategy<S>,
 
  private:
   const BoxTreeBounds& tree_of(std::uint32_t body) const { return forest_.tree(body); }
-  /// Lays out a body's rows anew if its tree has changed.
+  /// Lays out a body's rows again if its tree has changed.
   void follow_tree(std::uint32_t body) {
     rows_[body].follow(tree_of(body), this->scene_.primitives(body), leaf_boxes_);
     rows_[body].plans_changed();
@@ -209,7 +209,7 @@ class KineticBox final : public CountedStrategy<S>,
     this->count_.add(Counter::positions_fetched, rows_[body].make_wanted(node, tree_of(body), motion_, body));
   }
 
-  /// Computes the boxes of all nodes. Leaves the nodes in `order_`, parents before children.
+  /// Computes the boxes of all nodes. Stores the nodes in `order_`, parents before children.
   template <class Tree>
   InheritedBoxes<S, Tree> all_boxes(const Tree& tree, std::uint32_t body) {
     if (tree.edited()) {
@@ -291,12 +291,12 @@ KBVH_STRATEGY(kinetic_boxtree) {
            {"rebuild",
             "never",
             {"never", "median", "sah"},
-            "rebuilds the inner nodes of subtrees that have degenerated: how; never is the paper's"},
+            "how the inner nodes of degenerated subtrees are rebuilt; never: as in the paper"},
            {"degradation",
             "1.5",
             {},
             "a subtree is rebuilt when its summed box area over its own box's exceeds this many times "
-            "what it was when built",
+            "the same ratio when it was built",
             1},
            {"check_every",
             "10",

@@ -1,6 +1,6 @@
-// The exact tight AABB tree for motion that changes at run time: a certificate for each side of each box, in
-// a calendar of buckets by time. Frames determine the sides that may have changed, level by level
-// (core/families/envelope/calendar_tree.hpp).
+// The exact tight AABB tree for motion that changes at run time: each side of each box has a certificate, in
+// a calendar of buckets by time. At each frame, the buckets give the sides that may have changed, level by
+// level (core/families/envelope/calendar_tree.hpp).
 
 #include "core/contract/registry.hpp"
 #include "core/families/envelope/calendar_tree.hpp"

@@ -1,7 +1,7 @@
 // The exact tight AABB tree without a queue, for keyframed motion. At the start of each segment one pass
 // finds the sides whose realiser will change in it. The upper envelopes of these few sides give a list of
 // stores, sorted by time, that frames apply (core/families/envelope/segment_envelope.hpp). If the whole clip
-// is known, the frames of a segment can share the pass for the next one.
+// is known, the frames of a segment can share the pass for the next segment.
 
 #include "core/base/pacer.hpp"
 #include "core/contract/registry.hpp"
@@ -21,16 +21,16 @@ enum class Known : std::uint8_t {
 
 /// The state of the segment after the current one.
 enum class Next : std::uint8_t {
-  nothing,     ///< computed when it begins
+  nothing,     ///< computed when the segment begins
   translated,  ///< no vertex overtakes another
-  envelope,    ///< its envelope is being computed
+  envelope,    ///< the envelope is being computed
 };
 
 template <class S, Foresight F>
 class Envelopes final : public RealiserStrategy<S>, public TakesPlanChanges<S> {
   using Base = RealiserStrategy<S>;
   static constexpr bool ahead = F == Foresight::whole_clip;
-  static constexpr std::uint32_t slices = 64;  ///< per segment of small bodies
+  static constexpr std::uint32_t slices = 64;  ///< per segment, for small bodies
 
  public:
   static constexpr Foresight foresight = F;
@@ -108,10 +108,10 @@ class Envelopes final : public RealiserStrategy<S>, public TakesPlanChanges<S> {
     SegmentEnvelope<S> envelope;
     Known known = Known::nothing;
     double end = 0;          ///< of the segment
-    std::vector<S> room[2];  ///< for positions at its ends that are not stored
+    std::vector<S> room[2];  ///< for positions at the segment's ends that are not stored
     Next next = Next::nothing;
-    Pacer pacer;           ///< of the next segment's envelope
-    WideRealisers at_end;  ///< at the end of the current segment, as far as the next envelope is computed
+    Pacer pacer;           ///< for the next segment's envelope
+    WideRealisers at_end;  ///< at the segment's end; complete as far as the next envelope
   };
 
   /// Tests for equal steps to the last bit: then no vertex overtakes another.
@@ -164,7 +164,7 @@ class Envelopes final : public RealiserStrategy<S>, public TakesPlanChanges<S> {
     if (continues && foreseen == Next::envelope) {
       state.envelope.take_next();
     } else if ((continues && foreseen == Next::translated) || translates(motion, index)) {
-      // The same vector is added to all positions, exactly; and rounding is monotone.
+      // The same vector is added exactly to all positions, and rounding is monotone.
       state.envelope.make_empty(begin, state.end);
       this->count_.add(Counter::bodies_translated);
     } else {
@@ -190,12 +190,12 @@ class Envelopes final : public RealiserStrategy<S>, public TakesPlanChanges<S> {
     state.next = Next::envelope;
     state.pacer = {this->time(), state.end};
     const double next_end = later.lines_end(index);
-    // The ends are keyframes, which need no extra memory.
+    // The ends are keyframes, so they need no extra memory.
     state.envelope.start_next(this->hierarchy(index),
                               later.positions_on_lines(index, state.end, state.room[0]),
                               later.positions_on_lines(index, next_end, state.room[1]), next_end);
   }
-  /// Works on the next segment such that each frame until then gets an equal share, if frames come at equal
+  /// Works on the next segment so that all frames before it get an equal share, if frames come at equal
   /// steps.
   void work_ahead(std::uint32_t index, double step) {
     const State& state = states_[index];
@@ -210,7 +210,8 @@ class Envelopes final : public RealiserStrategy<S>, public TakesPlanChanges<S> {
   }
 
   void count_pass(std::uint32_t index) { count_part(index, this->hierarchy(index).node_count(), 0); }
-  /// Counts the part of a pass that leaves `after` of `before` wide nodes; parts add up to a pass.
+  /// Counts a part of a pass, in which the remaining wide nodes fall from `before` to `after`; parts add up
+  /// to a pass.
   void count_part(std::uint32_t index, std::uint32_t before, std::uint32_t after) {
     const auto& hierarchy = this->hierarchy(index);
     const auto part = [&](std::uint64_t all) {

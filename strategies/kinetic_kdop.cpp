@@ -9,7 +9,7 @@
 namespace kbvh {
 namespace {
 
-/// In the order of the forests of OfAnyDop.
+/// In the same order as the forests of OfAnyDop.
 const std::vector<std::string>& volume_words() {
   static const std::vector<std::string> words{"dop14", "dop18", "dop26"};
   return words;

@@ -56,8 +56,8 @@ class KineticSeparationList final : public CountedStrategy<S>,
     rows_.new_frame(motion_);
   }
 
-  /// Returns whether the last frame had many candidates. Their vertices are then most of all vertices, and
-  /// evaluating all positions is cheaper than fetching them one by one.
+  /// Returns whether the last frame had many candidates. These then use most of all vertices, so evaluating
+  /// all positions is cheaper than fetching them one by one.
   bool wants_all_positions() const override { return many_candidates_; }
 
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& /*budget*/) override {
@@ -87,8 +87,8 @@ class KineticSeparationList final : public CountedStrategy<S>,
     return {};
   }
 
-  /// Candidates that are the leaves of the list begin and end at its events. All others, and pairs of
-  /// triangles, are tested at every frame, so that a comparison costs little beside the tests.
+  /// Candidates that are the list's leaves begin and end at its events. All other candidates, and pairs of
+  /// triangles, are tested at every frame; compared with these tests, a comparison costs little.
   void find_changes(double t, Answer answer, PairBuffer& begun, PairBuffer& ended) override {
     if (!notes_changes_ || answer != Answer::candidates)
       return this->compare_answers(t, answer, begun, ended);
@@ -252,7 +252,7 @@ class KineticSeparationList final : public CountedStrategy<S>,
     for (std::uint32_t i = 0; i < list.body_pair_count(); ++i)
       if (list.is_entered(i)) work(i, list.body_pair(i));
   }
-  /// Visits leaves with themselves: within one body the list does not contain them.
+  /// Visits each leaf paired with itself, because within one body the list does not contain such pairs.
   template <class Work>
   void for_leaves_with_themselves(const BodyPair& pair, const Work& work) const {
     if (pair.first != pair.second) return;

@@ -1,18 +1,17 @@
 // Kinetic sweep and prune: the ends of the leaves' boxes stay sorted on all three axes, by events that
-// exchange neighbours, and each exchange of a lower with an upper end begins or ends an overlap. A frame
-// performs what is due, and tests the triangles of the leaves that overlap; it reads no tree. The ends are
-// those of boxes that are linear over a segment, so two of them exchange their places at most once, and no
-// event is a change of realiser.
+// exchange neighbours. Each exchange of a lower with an upper end begins or ends an overlap. A frame performs
+// the events that are due, and tests the triangles of the leaves that overlap; it reads no tree. The boxes
+// are linear over a segment, so two ends exchange their places at most once, and no event changes a realiser.
 //
-// When it wins: not seen yet. The tablecloth of 65k triangles has 188,000 exchanges a frame at l = 10, of
-// which 24 change the set of pairs: 22 ns each by events, 4 ns by sorting at each frame, and a thirtieth of
-// the speed of `bottom_up` (a seventh by sorting; at l = 100 a sixth and a third). Exchanges grow with the
-// square of the boxes, so large leaves are best, and a list of all overlaps on one axis, or of single
-// triangles, is out of the question. At l = 100 it is 1.6 times as fast as `sweep`; at l = 10 it takes four
-// times as long.
+// When it wins: not observed yet. The tablecloth of 65k triangles has 188,000 exchanges a frame at l = 10, of
+// which 24 change the set of pairs. An exchange takes 22 ns by events, 4 ns by sorting at each frame; the
+// result is a thirtieth of the speed of `bottom_up` (a seventh by sorting; at l = 100 a sixth and a third).
+// Exchanges grow with the square of the number of boxes, so large leaves are best, and a list of all overlaps
+// on one axis, or of single triangles, is out of the question. At l = 100 it is 1.6 times as fast as `sweep`;
+// at l = 10 it takes four times as long.
 //
-// A body that shrinks to a point makes quadratically many exchanges: there every box overlaps every other
-// one, so each lower end passes each upper end.
+// A body that shrinks to a point makes quadratically many exchanges: every box then overlaps every other one,
+// so each lower end passes each upper end.
 #include <algorithm>
 #include <vector>
 
@@ -151,8 +150,8 @@ class KineticSweep final : public CountedStrategy<S>, public AnswersSelfPairs, p
     return counts;
   }
 
-  /// Takes the ends of the segment that contains t. Bodies that meet no other one in it take no part: they
-  /// have no boxes of leaves, and no pairs.
+  /// Takes the ends of the segment that contains t. Bodies that meet no other body in the segment take no
+  /// part: they have no boxes of leaves, and no pairs.
   void begin_segment(double t) {
     for (std::uint32_t body = 0; body < takes_part_.size(); ++body) {
       const bool takes_part = !bounds_.side(body).apart && !bounds_.hierarchy(body).empty();
@@ -207,7 +206,7 @@ class KineticSweep final : public CountedStrategy<S>, public AnswersSelfPairs, p
     for (std::uint32_t& start : starts_) start = total += start;
     for (const BoxPairSet::Pair& pair : pairs) sorted_[--starts_[overlaps_.body_pair(pair)]] = pair;
   }
-  /// Computes the boxes of the leaves that the current pairs have in the second body.
+  /// Computes the boxes of those leaves of the second body that occur in the current pairs.
   void make_rows(std::uint32_t body, double t) {
     WideHierarchy<S>& hierarchy = bounds_.hierarchy(body);
     if (hierarchy.padded_leaf_size() == 1) return;
@@ -258,7 +257,7 @@ KBVH_STRATEGY(kinetic_sweep) {
       .parameters = {{"order",
                       "events",
                       {"events", "sort"},
-                      "how the lists are kept: by events, or sorted anew at each frame by exchanges of "
+                      "how the lists are kept: by events, or sorted again at each frame by exchanges of "
                       "neighbours, the same list and the same swaps"}},
   })};
 }

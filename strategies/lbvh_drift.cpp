@@ -3,8 +3,8 @@
 // of `lbvh`).
 //
 // When it wins: where a tree ages so fast that it lasts for one or two frames, it is as fast as `lbvh`; where
-// it lasts longer, faster than that and than a tree that keeps its shape (plan `ageing`). Its refit is slower
-// than `bottom_up`'s, which wins where nothing ages.
+// it lasts longer, it is faster than `lbvh` and than a tree that keeps its shape (plan `ageing`). Its refit
+// is slower than that of `bottom_up`, which wins where nothing ages.
 #include "core/contract/registry.hpp"
 #include "core/families/build/built_strategy.hpp"
 #include "core/families/build/curve_builders.hpp"

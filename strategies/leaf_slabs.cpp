@@ -1,11 +1,11 @@
-// Bottom-up refit whose leaves have a slab beside the box: two parallel planes, across the mean normal of the
-// leaf's triangles, between which the leaf lies (the slabs of Kay & Kajiya 1986, in one direction of the
-// leaf's own). Where the boxes of two leaves overlap, the triangles of each are compared with the slab of the
-// other, many at a time, before any two triangles are. A leaf of a smooth surface is flat, so its slab is
-// thin: of surfaces that lie on each other, as cloth does on a body, hardly a pair is left, and of surfaces
-// that cross, those near the curve of intersection. Slabs are made where a query needs them, which costs two
-// thirds as much as the boxes of a leaf's triangles. Needs no foresight; bodies that are not made of
-// triangles are queried by boxes. It is a declared baseline: it refits, and knows nothing of the future.
+// Bottom-up refit whose leaves have a slab as well as a box: two parallel planes, across the mean normal of
+// the leaf's triangles, that enclose the leaf (the slabs of Kay & Kajiya 1986, in a single direction chosen
+// for each leaf). Where the boxes of two leaves overlap, the triangles of each leaf are compared with the
+// slab of the other, many at a time, before any two triangles are. A leaf of a smooth surface is flat, so its
+// slab is thin. Where surfaces lie on each other, as cloth does on a body, hardly a pair is left; where they
+// cross, only pairs near the curve of intersection are left. Slabs are made where a query needs them, which
+// costs two thirds as much as the boxes of a leaf's triangles. Needs no foresight; bodies that are not made
+// of triangles are queried by boxes. It is a declared baseline: it refits, and knows nothing of the future.
 //
 // When it wins: with exact tests and without interpolation (l = 1). By plan `motion` (e1bc2ef, Intel Xeon,
 // float) it is 0.9 to 2.3 times as fast as `bottom_up`: most on a dancer's skirt and a recorded tablecloth,

@@ -1,11 +1,9 @@
 // Not contestants but limits to compare contestants with, in the same run and over the same frames. They
 // answer no query (guarantee: approximate, every pair is missed); only their update time has a meaning.
 // - limit_moved_bytes: an update reads and writes the bytes of a wide refit, in order, and computes nothing.
-//   Positions and
-//   vertex lists are read once, nodes are written once.
+//   Positions and vertex lists are read once, nodes are written once.
 // - limit_plain_motion: an update interpolates every position in the scene's scalar with default rounding.
-//   The correctly
-//   rounded evaluation (phase "motion") is compared with it.
+//   The correctly rounded evaluation (phase "motion") is compared with it.
 
 #include "core/families/limits/kernels/limits.hpp"
 #include "core/contract/registry.hpp"

@@ -1,4 +1,4 @@
-// Boxes that are linear in time: computed at the ends of each segment in which all flight plans are known to
+// Boxes that are linear in time: computed at both ends of each segment in which all flight plans are known to
 // be straight, and interpolated by the query at the nodes that it visits. Frames update nothing. Prior art:
 // core/adr/0010-prior-art-of-answering-intervals.md.
 

@@ -3,12 +3,12 @@
 // of two keyframes at the nodes that its query visits, top-down. Frames update nothing else. At keyframes the
 // boxes are tight.
 //
-// Between keyframes the boxes are those of `linear_bounds`, which makes the boxes of two keyframes when a
-// segment begins, for segments that all bodies share; here each body has segments of its own, and no frame
-// makes boxes from vertices, but the boxes of all keyframes take memory: about a third of that of the
-// keyframes' positions.
-// Measured at 65k triangles, l = 10, motion, update and query together: 1.0 to 1.3 times as fast as the best
-// refit, 1.07 to 1.12 times as fast as `linear_bounds`. Targets that are not keyframes are not known here.
+// Between keyframes the boxes are those of `linear_bounds`. That strategy computes the boxes of two keyframes
+// when a segment begins, and all bodies share its segments. Here each body has its own segments, and no frame
+// computes boxes from vertices, but the boxes of all keyframes take memory: about a third of that of the
+// keyframes' positions. Measured at 65k triangles, l = 10, motion, update and query together: 1.0 to 1.3
+// times as fast as the best refit, 1.07 to 1.12 times as fast as `linear_bounds`. Targets other than
+// keyframes are not supported.
 #include "core/contract/registry.hpp"
 #include "core/families/blend/blended_strategy.hpp"
 #include "core/families/blend/target_boxes.hpp"

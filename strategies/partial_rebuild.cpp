@@ -1,10 +1,10 @@
-// The worst leaves are taken apart, and their primitives make new ones (the idea of parry, which treats a
-// twentieth of the leaves at each frame). Then all leaves are sorted into the tree as wholes, by medians.
+// The worst leaves are dissolved, and their primitives form new ones (the idea of parry, which treats a
+// twentieth of the leaves at each frame). Then the tree is rebuilt over whole leaves, sorted by medians.
 //
-// When it wins: on bodies that are connected, or consist of many connected parts, it is as fast over a
-// clip as `drift_rebuild`, and its worst frame costs less, because no frame sorts all primitives. On a
-// soup of single triangles, whose leaves all age, it is slower than `drift_rebuild`. A share of a tenth
-// was too small for two mixing swarms: leaves aged faster than they were renewed.
+// When it wins: on bodies that are connected, or consist of many connected parts, it is as fast over a clip
+// as `drift_rebuild`, and its worst frame costs less, because no frame sorts all primitives. On a soup of
+// single triangles, whose leaves all age, it is slower than `drift_rebuild`. A share of a tenth was too small
+// for two mixing swarms: leaves aged faster than they were renewed.
 
 #include <cmath>
 

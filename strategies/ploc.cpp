@@ -1,9 +1,9 @@
-// PLOC: clusters along a curve merge with their best neighbour until one is left, which gives trees of
-// nearly the quality of the surface-area heuristic. Queries make fewer box tests than with `lbvh`, but
-// building takes many times as long: for frames that ask many queries of one tree. grain=16 clusters full
-// leaves instead of primitives, which is cheap and no better than `lbvh`. Beyond the paper: of equal unions
-// the clusters 2k and 2k + 1 choose each other, and a round in which hardly any choose each other merges
-// others, too.
+// PLOC: clusters along a curve merge with their best neighbour until one is left, which gives trees of nearly
+// the quality of the surface-area heuristic. Queries make fewer box tests than with `lbvh`, but building
+// takes many times as long: for frames that ask many queries of one tree. grain=16 clusters full leaves
+// instead of primitives, which is cheap and no better than `lbvh`. Beyond the paper: among equal unions the
+// clusters 2k and 2k + 1 choose each other, and a round in which few clusters choose each other also merges
+// others.
 #include "core/contract/registry.hpp"
 #include "core/families/build/built_strategy.hpp"
 #include "core/families/build/cluster_builders.hpp"

@@ -1,5 +1,5 @@
 // A new topology for every frame: the highest update cost, and the best boxes for a query. Building
-// allocates; that is part of this strategy's cost.
+// allocates; this is part of the strategy's cost.
 
 #include "core/contract/registry.hpp"
 #include "core/families/wide/stored_hierarchy.hpp"
@@ -25,7 +25,7 @@ class Rebuild final : public StoredHierarchyStrategy<S>,
     }
   }
 
-  /// Resets as for any other frame: later builds leave no trace.
+  /// Treats the reset like any other frame: later builds leave no trace.
   void reset_to(double t) override {
     Base::reset_to(t);
     for (std::uint32_t body = 0; body < this->hierarchies_.size(); ++body) update(body);

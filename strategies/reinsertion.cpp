@@ -1,14 +1,14 @@
-// Reinsertion: refit, and subtrees are taken out and put where they cost least (Bittner et al. 2013, with the
-// search of Meister & Bittner 2018). Nodes whose surface has grown since their children were last tried come
-// first, those that have grown most before the others, and only if the queries feel it. Each move is applied
-// before the next search: on one thread no two moves conflict. Nodes have eight children, of which a search
-// compares all at once, and leaves hold single primitives, because a leaf is moved as a whole.
+// Reinsertion: refit, then take subtrees out and insert them where they cost least (Bittner et al. 2013, with
+// the search of Meister & Bittner 2018). Considers only nodes whose surface has grown since their children
+// were last tried, those that have grown most first, and only if the queries notice it. Each move is applied
+// before the next search: on one thread no two moves conflict. Nodes have eight children, all of which a
+// search compares at once. Leaves hold single primitives, because a leaf is moved as a whole.
 //
 // When it wins: against a refit on scenes that age a tree (65,000 triangles, l = 1: 9 times on mixing swarms,
-// 10 times on unrolling yarns, 1.7 times on shattering balls). Nothing else that was tried: a builder makes a
-// whole new tree (`lbvh`) in less time than a refit of leaves of single primitives and the moves take
-// together, and `partial_rebuild` is faster, too. On cloth, where nothing is moved, its refit alone is 45
-// times slower than that of `bottom_up` with full leaves.
+// 10 times on unrolling yarns, 1.7 times on shattering balls). It won against nothing else that was tried: a
+// builder makes a whole new tree (`lbvh`) in less time than the moves and the refit of single-primitive
+// leaves take together, and `partial_rebuild` is faster, too. On cloth, where nothing is moved, its refit
+// alone is 45 times slower than that of `bottom_up` with full leaves.
 #include <algorithm>
 #include <cmath>
 
@@ -136,9 +136,9 @@ class Reinsertion final : public CountedStrategy<S>,
  private:
   struct Body {
     MovingTree<S> tree;
-    bool moved = false;  ///< the tree is not the one of the start
+    bool moved = false;  ///< the tree differs from the initial one
     double tests = 0;    ///< box tests of the queries since the last frame
-    double credit = 0;   ///< children that may be tried
+    double credit = 0;   ///< number of children that may be tried
     void start_over() {
       tests = 0;
       credit = 0;
@@ -182,7 +182,7 @@ class Reinsertion final : public CountedStrategy<S>,
     this->count_.add(Counter::nodes_visited, visits);
   }
 
-  /// Lists the nodes that have grown since they settled, those first that have grown most.
+  /// Lists the nodes that have grown since they settled, in decreasing order of growth.
   void choose(Body& body, double tests) {
     MovingTree<S>& tree = body.tree;
     const auto nodes = tree.nodes();
@@ -197,8 +197,8 @@ class Reinsertion final : public CountedStrategy<S>,
     });
   }
 
-  /// Tries to move every child of a node, the last first. The node may have become another one since it was
-  /// chosen. Returns the nodes visited.
+  /// Tries to move every child of a node, starting with the last. The node may have been replaced since it
+  /// was chosen. Returns the number of nodes visited.
   std::uint64_t improve(Body& body, std::uint32_t node) {
     MovingTree<S>& tree = body.tree;
     std::uint64_t visits = 0;
@@ -252,12 +252,17 @@ KBVH_STRATEGY(reinsertion) {
       .declares = {.restructures = true, .time_budget = true},
       .topology = {.widths = {8}, .preferred = {.method = BuildMethod::sah, .width = 8, .leaf_size = 1}},
       .parameters =
-          {{"tried", "0.1", {}, "subtrees tried per frame, at most, as a share of the primitives", 0, 1},
+          {{"tried",
+            "0.1",
+            {},
+            "maximum number of subtrees tried per frame, as a share of the primitives",
+            0,
+            1},
            {"growth",
             "1.3",
             {},
-            "factor by which the surface of a node has grown since its children were last tried, from which "
-            "on they are tried again",
+            "growth of a node's surface, as a factor since its children were last tried, from which on they "
+            "are tried again",
             1,
             1e6},
            {"price",
@@ -270,7 +275,7 @@ KBVH_STRATEGY(reinsertion) {
            {"least",
             "0.02",
             {},
-            "least gain of a move, as a share of the surface of the node that the subtree leaves",
+            "minimum gain of a move, as a share of the surface of the node that the subtree leaves",
             0,
             1},
            {"lane_price",
@@ -279,6 +284,6 @@ KBVH_STRATEGY(reinsertion) {
             "cost of each child of a node, as a share of the surface of the node",
             0,
             1},
-           {"visits", "16", {}, "nodes visited by one search, at most", 1, 1e6, Numbers::whole}},
+           {"visits", "16", {}, "maximum number of nodes visited by one search", 1, 1e6, Numbers::whole}},
   })};
 }

@@ -1,10 +1,11 @@
-// Tree rotations at every refit (Kopta et al. 2012), on wide nodes: two grandchildren of a node change
-// places if that saves surface, so that all leaves keep their depth. Only nodes whose children's surface
-// has grown since they were last looked at are looked at again.
+// Tree rotations at every refit (Kopta et al. 2012), on wide nodes: two grandchildren of a node change places
+// if that saves surface, so all leaves keep their depth. A node is checked again only when the surface of its
+// children has grown since its last check.
 //
 // When it wins: nowhere that was tried. On the built-in scenes that age most it is as fast as the refit
-// without rotations, or slower. What ages there are the leaves, whose primitives drift apart, and no
-// rotation divides a leaf; with smaller leaves, places are too far apart for exchanges within two levels.
+// without rotations, or slower. In these scenes the leaves age, because their primitives drift apart, and no
+// rotation divides a leaf. With smaller leaves, better places are too far away for exchanges within two
+// levels.
 
 #include "core/contract/registry.hpp"
 #include "core/families/restructure/cousins.hpp"
@@ -58,8 +59,8 @@ class Rotations final : public StoredHierarchyStrategy<S>,
     if (rotations_ != before) this->refit_counted(body);
   }
 
-  /// Exchanges grandchildren of a node as long as that pays, unless its children are as they were when
-  /// nothing could be gained.
+  /// Exchanges grandchildren of a node as long as that pays, unless its children are the same as when nothing
+  /// could be gained.
   void rotate(std::uint32_t body, std::uint32_t node) {
     auto& hierarchy = this->hierarchies_[body];
     const std::uint32_t wide = hierarchy.wide_node(node);
@@ -87,7 +88,7 @@ class Rotations final : public StoredHierarchyStrategy<S>,
   void add_counts(Counters& table) const override { table.add("rotations", rotations_); }
 
   std::uint32_t most_;
-  std::vector<std::vector<S>> settled_;  // [body][node]: surface ratio of its children when last looked at
+  std::vector<std::vector<S>> settled_;  // [body][node]: surface ratio of its children at the last check
   Cousins<S> cousins_;
   SubtreeSwap swap_;
   std::uint64_t rotations_ = 0;
@@ -108,7 +109,7 @@ KBVH_STRATEGY(rotations) {
       .parameters = {{"most",
                       "4",
                       {},
-                      "exchanges of two grandchildren of one node in one frame, at most",
+                      "maximum number of exchanges per frame, each of two grandchildren of a node",
                       1,
                       1000,
                       Numbers::whole}},

@@ -1,9 +1,9 @@
-// Subtrees whose children overlap more than when they were new are rebuilt, those first that gain most
-// for their size (Yoon, Curtis & Manocha 2007), within a budget of primitives per frame. A rebuild sorts
-// the primitives of the subtree by medians into its leaves.
+// Rebuilds subtrees whose children overlap more than when they were new, those with the largest gain per
+// primitive first (Yoon, Curtis & Manocha 2007), within a budget of primitives per frame. A rebuild sorts the
+// primitives of the subtree by medians into its leaves.
 //
-// When it wins: where parts of a body age and others do not, and where no frame may be much dearer than
-// another. Over a clip of which all parts age it is slower than `drift_rebuild`.
+// When it wins: where some parts of a body age and others do not, and where no frame may be much more
+// expensive than another. Over a clip in which all parts age it is slower than `drift_rebuild`.
 
 #include <algorithm>
 
@@ -48,7 +48,7 @@ class SelectiveRestructuring final : public LeafStrategy<S> {
   static constexpr double unknown = -1;
   struct Tree {
     std::vector<double> fresh;  ///< [node]: least surface ratio of its children since they were new
-    double credit = 0;          ///< primitives that may be sorted
+    double credit = 0;          ///< number of primitives that may be sorted
   };
   /// A subtree to be rebuilt.
   struct Aged {

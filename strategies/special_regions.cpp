@@ -1,12 +1,12 @@
-// Refits only where a body deforms: Lau, Chan, Luk & Li (2002) look for the regions that a user's edit of a
-// NURBS surface moves, and update the boxes of these alone. A control point moves the patches near it and no
-// others; so does a vertex its triangles. Here the regions are found once for each segment between keyframes,
+// Refits only where a body deforms: Lau, Chan, Luk & Li (2002) find the regions that a user's edit of a NURBS
+// surface moves, and update only their boxes. A control point moves the patches near it and no others, just
+// as a vertex moves only its triangles. Here the regions are found once for each segment between keyframes,
 // by comparing its two ends: nodes below which nothing moves keep their boxes until the segment ends. Boxes
 // are tight, for control nets, polygons and points.
 //
-// Measured at 65k triangles over the best refit: 1.2 where a twentieth of a sheet moves and l = 10
-// (dented_sheet). Where all of a body moves, the search is added to the refit once per segment: 0.84 at l =
-// 1, 0.95 to 0.98 at l = 10.
+// Speed relative to the best refit, measured at 65k triangles: 1.2 where a twentieth of a sheet moves and l =
+// 10 (dented_sheet). Where all of a body moves, the search is added to the refit once per segment: 0.84 at l
+// = 1, 0.95 to 0.98 at l = 10.
 #include <limits>
 #include <utility>
 
@@ -50,7 +50,7 @@ class SpecialRegions final : public StoredHierarchyStrategy<S>, public AnswersSe
   static constexpr double none = -std::numeric_limits<double>::infinity();
   struct Body {
     MovingRegion<S> region;
-    typename MovingRegion<S>::Marks moves, moved;  ///< in this segment, and in the one before
+    typename MovingRegion<S>::Marks moves, moved;  ///< in this segment and in the previous one
     double end = none;                             ///< of the segment; none: no segment is known
     bool settled = false;                          ///< nodes that rest in this segment have their boxes
   };
@@ -73,7 +73,7 @@ class SpecialRegions final : public StoredHierarchyStrategy<S>, public AnswersSe
         body.region.take(hierarchy, body.moves);
         return;
       }
-      // What moved in the segment before has to reach its end, too.
+      // Anything that moved in the previous segment has to reach its end, too.
       for (std::size_t node = 0; node < body.moves.size(); ++node) body.moved[node] |= body.moves[node];
       body.settled = false;
       body.region.take(hierarchy, body.moved);

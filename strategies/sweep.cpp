@@ -1,7 +1,7 @@
-// Sweep on one axis, without a hierarchy: boxes stay sorted by their lower sides on the axis on which
-// they overlap least, and each is compared with the run of boxes that begin before it ends, sixteen at a
-// time. Needs no tree and tolerates any motion: faster than a refit where bodies mix. `lbvh` won on all
-// scenes that were tried, because a run along one axis holds many boxes that are far away on the others.
+// Sweep on one axis, without a hierarchy: boxes stay sorted by their lower sides on the axis on which they
+// overlap least, and each is compared with the run of boxes that begin before it ends, sixteen at a time. It
+// tolerates any motion: faster than a refit where bodies mix. `lbvh` won on all scenes that were tried,
+// because a run along one axis holds many boxes that are far away on the others.
 #include <cmath>
 
 #include "core/contract/registry.hpp"
@@ -52,8 +52,8 @@ class Sweep final : public BuiltEachFrame<S, SortedBoxes<S>> {
   void take_boxes(std::uint32_t body) {
     boxes_.take(this->scene_.primitives(body), lists_[body], this->sampled_.positions(body), kernels_);
   }
-  /// Finds the axis on which the fewest boxes overlap, as far as their mean length and the standard deviation
-  /// of their centres tell.
+  /// Finds the axis on which the fewest boxes overlap, estimated from their mean length and the standard
+  /// deviation of their centres.
   std::uint32_t best_axis() {
     double length[3] = {}, sum[3] = {}, squares[3] = {};
     double count = 0;

@@ -1,6 +1,6 @@
-// Top-down refit: every node's box directly from the vertices below it, parents before children. It reads
-// each vertex once per level, which makes it the slower refit; it is the building block of refits on demand
-// (van den Bergen 1998, Larsson & Akenine-Moeller 2001).
+// Top-down refit: every node's box is computed directly from the vertices below it, parents before children.
+// It reads each vertex once per level, which makes it slower than `bottom_up`; it is the building block of
+// refits on demand (van den Bergen 1998, Larsson & Akenine-Moeller 2001).
 
 #include "core/contract/registry.hpp"
 #include "core/families/wide/stored_hierarchy.hpp"
@@ -29,8 +29,8 @@ class TopDown final : public StoredHierarchyStrategy<S>,
   }
 
  private:
-  /// Entries of the topology's primitive list below each node: contiguous, because leaves are laid out left
-  /// to right.
+  /// The entries below each node in the topology's list of primitives: contiguous, because leaves are laid
+  /// out left to right.
   struct Range {
     std::uint32_t begin, end;
   };
@@ -75,7 +75,7 @@ class TopDown final : public StoredHierarchyStrategy<S>,
   }
 
   std::vector<std::vector<Range>> ranges_;
-  std::vector<std::uint64_t> reads_;  ///< [body] of vertices, by an update
+  std::vector<std::uint64_t> reads_;  ///< [body] vertex reads per update
 };
 
 }  // namespace

@@ -8,7 +8,7 @@ namespace kbvh {
 namespace {
 
 /// Returns a topology of a body for `samples` times of the clip, with the width and leaf size of `before`;
-/// nothing for a body that does not move as its keyframes say.
+/// nothing for a body that does not follow its keyframes.
 template <class S>
 std::optional<Topology> over_clip(const SceneView<S>& scene, const ClipMotion<S>& motion, std::uint32_t body,
                                   const Topology& before, std::size_t samples) {
@@ -40,7 +40,7 @@ class Tsah final : public StoredHierarchyStrategy<S>,
         motion_(motion),
         samples_(std::size_t(params.number("samples"))) {}
 
-  /// The trees are made for the clip, so making them is part of it.
+  /// The trees are made for one clip, so making them is part of its cost.
   void reset_to(double t) override {
     for (std::uint32_t body = 0; body < this->hierarchies_.size(); ++body) {
       WideHierarchy<S>& hierarchy = this->hierarchies_[body];

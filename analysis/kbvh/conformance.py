@@ -1,4 +1,4 @@
-"""Whether a strategy keeps what it promises."""
+"""Checks whether a strategy keeps its promises."""
 
 from __future__ import annotations
 
@@ -122,9 +122,9 @@ def check(
     precisions: Sequence[str] = ("float32", "float64"),
     l: int = 5,
 ) -> list[Verdict]:
-    """Holds a strategy, l frames per keyframe interval, against the truth: its pairs against those of the judge and, on small
-    scenes, of brute force; its bounds, if it shows them, against the vertices below them. By default on `small_scenes`. Errors of
-    a strategy in Python are a broken guarantee; wrong parameters raise ConfigError.
+    """Compares a strategy with the truth, at l frames per keyframe interval: its pairs with those of the judge and, on small
+    scenes, of brute force; its bounds, if it shows them, with the vertices below them. By default on `small_scenes`. An error
+    raised by a strategy in Python counts as a broken guarantee; wrong parameters raise ConfigError.
 
     >>> for verdict in kbvh.check("bottom_up", kbvh.small_scenes()[:2], precisions=["float32"]): print(verdict)
     bottom_up on soups, float32: holds (11 frames, 284 pairs, 0 missed, 0 extra)

@@ -1,8 +1,8 @@
 """Strategies that are written in Python: the way to try an idea in ten minutes.
 
-A strategy answers which pairs of primitives may intersect, frame by frame. kbvh tests its candidates exactly, holds it against
-the truth (`kbvh.check`) and lets it take part in studies (`kbvh.run`) beside the others. It is slow: the interpreter takes part in
-every time, which compares ideas by their counters, not by their milliseconds.
+A strategy answers which pairs of primitives may intersect, frame by frame. kbvh tests its candidates exactly, compares it
+with the truth (`kbvh.check`) and lets it take part in studies (`kbvh.run`) with the others. It is slow: every time includes
+the interpreter, so compare ideas by their counters, not by their milliseconds.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class SceneView:
 
 
 class Motion:
-    """What a strategy without foresight knows of the motion. Arrays are copies."""
+    """The motion as a strategy without foresight sees it. Arrays are copies."""
 
     def __init__(self, core: Any) -> None:
         self._core = core
@@ -121,7 +121,7 @@ _MOTIONS: dict[str, Type[Motion]] = {
 class Strategy:
     """The base of strategies in Python.
 
-    Override `candidates`, and what else the idea needs. `self.scene` is the SceneView, `self.params` the parameters as text,
+    Override `candidates`, and whatever else the idea needs. `self.scene` is the SceneView, `self.params` the parameters as text,
     `self.motion` the motion as far as `foresight` shows it. The first lines of the class's docstring say in lists and reports
     what the strategy is.
     """

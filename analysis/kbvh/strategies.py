@@ -1,4 +1,4 @@
-"""What strategies there are."""
+"""The strategies, their parameters and their counters."""
 
 from __future__ import annotations
 

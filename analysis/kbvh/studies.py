@@ -16,8 +16,8 @@ from .scenes import PathLike
 
 @dataclass
 class Run:
-    """What became of a plan: configurations measured, found in the folder already, refused their time because a guarantee was
-    broken, and unfinished for want of memory; the tables as text; and the results, if a folder was given."""
+    """The outcome of a plan: configurations that were measured, were in the folder already, were not timed because a guarantee
+    was broken, or are unfinished for lack of memory; the tables as text; and the results, if a folder was given."""
 
     measured: int
     skipped: int

@@ -81,7 +81,7 @@ def refit(tree: Tree, primitives: Array) -> Array:
 
 
 def _overlap(a: Array, b: Array) -> npt.NDArray[np.bool_]:
-    """Tells which boxes touch; boxes are closed."""
+    """Returns which boxes touch; boxes are closed."""
     return np.asarray(np.all((a[:, 0] <= b[:, 1]) & (b[:, 0] <= a[:, 1]), axis=1))
 
 

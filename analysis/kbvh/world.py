@@ -161,7 +161,7 @@ class World:
         return np.asarray(self._core.frame_times(operator.index(l)))
 
     def play(self, l: int = 1) -> Iterator[float]:
-        """Starts over and stops at each frame of the clip, for questions.
+        """Starts over and stops at each frame of the clip, so that questions can be asked there.
 
         >>> world = kbvh.World(kbvh.scene("waving_sheet", triangles=200, keyframes=3), "bottom_up")
         >>> len([len(world.pairs()) for t in world.play(l=2)])
@@ -231,7 +231,7 @@ class World:
         return self._core.true_pairs()
 
     def changes(self) -> tuple[Array, Array]:
-        """Returns the pairs that began and those that ended to intersect since the last call, with the fields of `pairs`. The
+        """Returns the pairs that began and those that ceased to intersect since the last call, with the fields of `pairs`. The
         first call after the start or `reset` begins all pairs.
 
         >>> world = kbvh.World(kbvh.scene("waving_sheet", triangles=200, keyframes=3), "interval_join")

@@ -1,8 +1,8 @@
-"""Serves a built lab to browsers on this machine, and the scenes of a study beside it.
+"""Serves a built lab to browsers on this machine, and with it the scenes of a study.
 
     serve.py FOLDER [--port P] [--study DIR] [--open]
 
-The lab is at http://127.0.0.1:P/. Of a study (a folder of `kbvh run`), study/scenes.json lists the scenes as
+The lab is at http://127.0.0.1:P/. For a study (a folder of `kbvh run`), study/scenes.json lists the scenes as
 [{"name", "framesPerSecond", "files": [addresses]}] (without a study: none), and the files are served below study/. The server answers only requests
 that name it as 127.0.0.1 or localhost, so that no page of another site can read from it.
 """
@@ -78,7 +78,7 @@ class Handler(SimpleHTTPRequestHandler):
         return None
 
     def end_headers(self) -> None:
-        self.send_header("Cache-Control", "no-cache")  # a lab that was built anew is the one that is shown
+        self.send_header("Cache-Control", "no-cache")  # so that a lab that was built again is the one shown
         super().end_headers()
 
     def log_message(self, format: str, *args: object) -> None:

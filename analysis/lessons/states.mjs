@@ -1,4 +1,4 @@
-// Prepared states of the lab, by name. `note` is the line beside the button.
+// Prepared states of the lab, by name. `note` is the line next to the button.
 import { checkers } from "./checkers/index.mjs";
 import { scenes } from "./scenes/scenes.mjs";
 import { binary, paper, state } from "./scenes/state.mjs";
@@ -18,9 +18,9 @@ export const states = {
   shoal: { state: state(scenes.shoal()), note: "Eight separate triangles, a tree of fifteen nodes." },
   tangents: { state: state(scenes.tangents(), "kinetic_aabb", root), note: "One polygon of sixteen vertices: the counterexample to T9." },
   wander: { state: state(scenes.wander(16)), note: "Sixteen points on random straight lines." },
-  drape: { state: state(scenes.drape(), "kinetic_boxtree", { compare: { ...paper.kinetic_aabb, topology: binary } }), note: "BoxTree beside AABB tree on a cloth that starts flat." },
+  drape: { state: state(scenes.drape(), "kinetic_boxtree", { compare: { ...paper.kinetic_aabb, topology: binary } }), note: "BoxTree next to an AABB tree, on a cloth that starts flat." },
   combs: { state: state(scenes.combs(), "kinetic_separation_list"), note: "Two combs slide past each other." },
-  sheet: { state: state(scenes.sheet(), "kinetic_aabb", { compare: { strategy: "bottom_up", params: {}, topology: binary } }), note: "Kinetic tree beside refit; compare the values written." },
+  sheet: { state: state(scenes.sheet(), "kinetic_aabb", { compare: { strategy: "bottom_up", params: {}, topology: binary } }), note: "Kinetic tree next to a refit; compare the values written." },
   tie: { state: state(scenes.tie(), "kinetic_aabb", root), note: "Three points meet in one point of the diagram." },
   carried: { state: state(scenes.carried()), note: "Sixty-four points, translated exactly." },
   "carried-far": { state: state(scenes.carried(1000000), "kinetic_aabb", { precision: "float32" }), note: "The same points, a million units away, in float." },

@@ -19,7 +19,7 @@ html_show_sphinx = False
 html_copy_source = False
 myst_heading_anchors = 3
 myst_enable_extensions = ["deflist", "colon_fence"]
-# GitHub-style pages begin parts where they like.
+# Pages in GitHub's style may skip levels of headings.
 suppress_warnings = ["myst.header"]
 nitpicky = True
 # Blocks without a language are commands and their output.

@@ -1,6 +1,6 @@
 """Sphinx extension: makes Debian's furo work from a folder.
 
-Debian compiles furo's sources by other tools than furo. Its style sheet imports normalize.css from /javascript of a web server, and lacks
+Debian compiles furo's sources with other tools than furo does. Its style sheet imports normalize.css from /javascript of a web server, and lacks
 the colours for a dark scheme that the reader's system asks for; its script is a module that is loaded as a plain one. So pages stand in
 a white frame, stay bright, and have a dead theme switch. The build writes both files again: the imported sheet becomes a neighbour, the
 dark colours follow the system, and the imported script becomes a part of the script.

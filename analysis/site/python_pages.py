@@ -10,7 +10,7 @@ import re
 from pathlib import Path
 from typing import Any, Union
 
-#: The parts of the page, in the order of use; every public name stands in one of them.
+#: The parts of the page, in the order of use; every public name appears in one of them.
 PARTS = {
     "Scenes": ["scene", "builtin_scenes", "load", "shapes", "Scene", "Body", "PlanChange"],
     "Playing a scene": ["World", "Hierarchy", "Audit", "Step", "padded", "counters"],

@@ -1,7 +1,7 @@
 """Gathers the pages of the site: the tree's own Markdown, the pages of this folder, and pages made from registry and results.
 
 usage: stage.py LIST_JSON RESULTS_DIR PAGES_DIR HTML_DIR NOTEBOOKS_DIR
-HTML_DIR holds what stands beside the pages already: lab, lab/lessons, report. NOTEBOOKS_DIR holds the notebooks that were run.
+HTML_DIR already holds what lies next to the pages: lab, lab/lessons, report. NOTEBOOKS_DIR holds the notebooks that were run.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ COMPARISON = """<section class="comparison" data-comparison>
 <p class="what">The project's own C++ runs here, compiled to WebAssembly: a kinetic AABB tree and a bottom-up refit, each a binary tree with one
 triangle in a leaf. Time is update and query together, of the median of several clips played by turns, on your machine. <a href="lab/index.html#scene=cloth-on-box">Open it in the lab.</a></p>
 </section>"""
-#: The ways on from the first page: page, question, answer.
+#: The links that lead on from the first page: page, question, answer.
 WAYS = [
     ("analysis/guides/choosing.html", "What do I take?", "Which strategy suits your motion, and what it costs."),
     ("claims.html", "Does the paper hold?", "Each claim of 2006, measured, with its verdict."),
@@ -84,7 +84,7 @@ WAYS = [
 
 
 def first_page(html: Path) -> str:
-    """Returns the comparison, if the lab stands in the site, and the ways on."""
+    """Returns the comparison, if the site has the lab, and the links that lead on."""
     lab = COMPARISON if (html / "lab" / "lab.js").exists() else "<p>The lab is not part of this site: <code>experiments/lab</code> builds it.</p>"
     ways = "".join(f'<li><a href="{page}"><b>{question}</b>{answer}</a></li>' for page, question, answer in WAYS)
     return "\n".join(["```{raw} html", lab, f'<ul class="ways">{ways}</ul>', "```"])
@@ -98,7 +98,7 @@ def filled(text: str, html: Path) -> str:
 
 
 def report_page(html: Path, results: Path) -> str:
-    """Returns the page that leads to report and explorer, as far as they stand in the site."""
+    """Returns the page that leads to report and explorer, as far as the site has them."""
     lines = ["# Report and explorer", "", f"Both show the results in `{results.name}`, in one file each that needs no network.", ""]
     for name, title, about in (
         ("report.html", "Report", "tables and figures, claim by claim"),

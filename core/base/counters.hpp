@@ -51,8 +51,8 @@ const char* name(Counter counter);
 /// Returns the meaning of a counter in one line.
 const char* meaning(Counter counter);
 
-/// The counter table of one strategy instance; cleared by `reset`. Instances count while they are timed, too:
-/// inner loops count in variables of their own, and add their sums here once.
+/// The counter table of one strategy instance; cleared by `reset`. Instances also count while they are timed:
+/// inner loops count in local variables, and add their sums here once.
 struct Counters {
   std::array<std::uint64_t, std::size_t(Counter::count)> values{};
   /// Counts bound events by the depth of the node at which they occur (0: root); the last entry sums all
@@ -64,7 +64,7 @@ struct Counters {
   void peak(Counter c, std::uint64_t n) { (*this)[c] = std::max((*this)[c], n); }
   void event_at(std::size_t depth) { ++events_at_depth[std::min(depth, events_at_depth.size() - 1)]; }
 
-  /// A counter of a strategy's own.
+  /// A strategy's own counter.
   struct Named {
     std::string_view name;  ///< snake_case; must outlive the table: a string literal
     std::uint64_t value = 0;

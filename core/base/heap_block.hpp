@@ -3,9 +3,9 @@
 
 namespace kbvh {
 
-/// Returns the memory that an allocation of `size` bytes takes, with the allocator's own word, in multiples
-/// of 16 bytes: glibc's malloc, and about what others do. For structures whose nodes are allocated one by
-/// one.
+/// Returns the memory that an allocation of `size` bytes takes, including the allocator's own word, in
+/// multiples of 16 bytes. Correct for glibc's malloc, and approximately for others. For structures whose
+/// nodes are allocated one by one.
 constexpr std::size_t heap_block_bytes(std::size_t size) {
   return (size + sizeof(std::size_t) + 15) / 16 * 16;
 }

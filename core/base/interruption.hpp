@@ -3,12 +3,12 @@
 
 namespace kbvh {
 
-/// Ends work at the wish of a user. It is no std::exception, so that a study ends instead of recording that a
-/// strategy failed.
+/// Ends work at a user's request. Not derived from std::exception, so that a study ends instead of recording
+/// that a strategy failed.
 struct Interrupted {};
 
 /// During its lifetime, long work in this thread ends by Interrupted after `stop` has become true: between
-/// two frames of a session and between two rows of a brute-force search, where nothing is half done.
+/// two frames of a session and between two rows of a brute-force search, where nothing is half finished.
 class Interruptible {
  public:
   explicit Interruptible(const std::atomic<bool>& stop) : former_(current()) { current() = &stop; }

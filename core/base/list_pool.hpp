@@ -27,7 +27,7 @@ class ListPool {
     return {values_.data() + list.begin, list.count};
   }
   std::uint32_t keys() const { return std::uint32_t(lists_.size()); }
-  /// Prefetches what reading a list begins with.
+  /// Prefetches the data that reading a list starts with.
   void prefetch(std::uint32_t key) const { __builtin_prefetch(&lists_[key]); }
   /// Appends empty lists, or drops the last lists.
   void resize(std::uint32_t keys) {

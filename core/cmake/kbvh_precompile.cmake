@@ -1,6 +1,6 @@
-# With KBVH_PRECOMPILE, what nearly every source includes is read once: the standard library, integers of any length and,
-# for the program, JSON. Half of the time of a short file goes there. It is for builds that are tested: GCC then makes other
-# machine code of a few functions, and times would have to be compared anew. Every source still names what it needs, and
+# With KBVH_PRECOMPILE, the headers that nearly every source includes are read once: the standard library, integers of any
+# length and, for the program, JSON. They take half of the time of a short file. The option is for builds that are tested:
+# GCC then generates other machine code for a few functions, and times would have to be compared again. Every source still names what it needs, and
 # headers are tested without (headers_self_contained).
 option(KBVH_PRECOMPILE "Precompile the headers of the standard library, Boost and JSON: faster builds" OFF)
 

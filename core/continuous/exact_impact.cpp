@@ -111,8 +111,8 @@ class ExactQuery {
 
  private:
   /// Adds candidate times for points that stay in one plane. The set of contact times is closed, and it can
-  /// change only at roots of the polynomials that `touch_at` reads: if there is any contact, there is one at
-  /// such a root or at an end.
+  /// change only at roots of the polynomials that `touch_at` reads. So if there is any contact, there is one
+  /// at such a root or at an end.
   void add_times_in_plane() {
     const auto add = [&](const MovingVector& vector) {
       for (const Polynomial& q : vector.axis)
@@ -136,7 +136,7 @@ class ExactQuery {
     for (int k = 0; k < 3; ++k) {
       const int side = t.sign(normal_.axis[k]);
       if (side == 0) continue;
-      // Projecting along axis k loses nothing of the points' plane.
+      // Projecting along axis k preserves the points' plane.
       for (const MovingVector& share : shares_)
         if (t.sign(share.axis[k]) * side < 0) return false;
       return true;

@@ -146,7 +146,7 @@ class Filter {
  private:
   static constexpr int most_halvings = 24, most_cells = 96;
 
-  /// Visits cells from the earliest on, until one certainly contains a contact, or one is undecided.
+  /// Visits cells from the earliest on, until one certainly contains a contact or is undecided.
   Verdict decide() {
     int count = 1, examined = 0;
     while (count > 0) {
@@ -174,8 +174,8 @@ class Filter {
     return Verdict::free;
   }
 
-  /// At contact n and all its shares have the same sign: two of opposite signs exclude a contact. Where all
-  /// have one sign, every root of the cubic is a contact.
+  /// At contact n and all its shares have the same sign: two of opposite signs exclude a contact. If all have
+  /// one sign, every root of the cubic is a contact.
   Verdict examine(const Cell& cell) const {
     const double bound = bounds_.cubic(cell.depth);
     if (nowhere_zero(cell.f, bound)) return Verdict::free;

@@ -18,7 +18,7 @@ enum class EventKind : std::uint8_t {
   boxes_meet,      ///< two boxes of a separation list begin to overlap
   boxes_separate,  ///< two boxes of a separation list cease to overlap
   review,          ///< no bound changes: the structure searches for the next event of a pair of boxes
-  window,  ///< no bound changes: the structure chooses the pairs of bodies, or of boxes, to watch anew
+  window,          ///< no bound changes: the structure chooses again which pairs of bodies or boxes to watch
 };
 
 /// One certificate and its failure time. A side is numbered 2 * axis + (0 lower, 1 upper).
@@ -73,8 +73,8 @@ struct WatchedPair {
   std::uint32_t body = 0, node = 0;              ///< the first box
   std::uint32_t other_body = 0, other_node = 0;  ///< the second box
   bool overlapping = false;
-  /// Whether the pair is in the list: its boxes are apart, or are overlapping leaves. Otherwise it is an
-  /// inner pair above the list, whose boxes overlap.
+  /// Whether the pair is in the list: its boxes are apart, or both are leaves and overlap. Otherwise it is an
+  /// inner pair above the list, with overlapping boxes.
   bool listed = false;
 
   auto operator<=>(const WatchedPair&) const = default;
@@ -106,8 +106,8 @@ class EventSource {
   /// Starts to append every change of a bound to `log`, for any cause (events, changes of plans) except
   /// `reset`. Null stops the logging.
   virtual void watch_bounds(std::vector<BoundNotice<S>>* log) = 0;
-  /// Replaces `out` by all pairs of boxes that the strategy watches, in no particular order; by nothing if it
-  /// has no separation list.
+  /// Replaces `out` by all pairs of boxes that the strategy watches, in no particular order. Leaves `out`
+  /// empty without a separation list.
   virtual void watched_pairs(std::vector<WatchedPair>& out) const { out.clear(); }
 
  protected:

@@ -33,7 +33,7 @@ enum class Answer : std::uint8_t {
   pairs,       ///< of `Strategy::pairs_at`
 };
 
-/// Answers in its own way what has changed, at a cost in proportion to the changes.
+/// Reports changes of the answer directly, at a cost in proportion to the changes.
 template <class S>
 class AnswersChanges {
  public:
@@ -42,8 +42,8 @@ class AnswersChanges {
  protected:
   friend class Strategy<S>;
   /// Implements `Strategy::changes_at`: appends the difference between the answer at t and that of the last
-  /// call with the same `answer` since `reset_to`. A strategy that cannot do better for some answer calls
-  /// `compare_answers`, for that answer always.
+  /// call with the same `answer` since `reset_to`. A strategy that has no faster way for one of the answers
+  /// always calls `compare_answers` for it.
   virtual void find_changes(double t, Answer answer, PairBuffer& begun, PairBuffer& ended) = 0;
 };
 
@@ -69,7 +69,7 @@ class AnswersRays {
 
  protected:
   friend class Strategy<S>;
-  /// Implements `Strategy::hits_at`: sets hits[i] to the answer to rays[i]; there are as many of both. The
+  /// Implements `Strategy::hits_at`: sets hits[i] to the answer to rays[i]; both have the same length. The
   /// strategy stands at t. Lazy strategies refresh what the rays read, positions included.
   virtual void find_hits(double t, RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits) = 0;
 };
@@ -99,7 +99,7 @@ class TakesGeometryChanges {
 };
 
 /// Also answers pairs within one body if the scene asks for them; primitives that share a vertex are not a
-/// pair. No function has to be implemented: these pairs are appended to the others.
+/// pair. The interface has no functions: these pairs are appended to the others.
 class AnswersSelfPairs {
  protected:
   ~AnswersSelfPairs() = default;

@@ -45,7 +45,7 @@ BuilderConfig suitable_builder(const Info& info, std::optional<BuildMethod> meth
 
 namespace {
 
-/// Returns where a keyframe is beyond the range of the contestant; empty if none is.
+/// Returns where a keyframe exceeds the range of the contestant; empty if none does.
 template <class S>
 std::string beyond_range(const Info& info, const Body<S>& body) {
   const FlightPlans<S>& plans = body.plans;
@@ -96,7 +96,7 @@ std::unique_ptr<Strategy<S>> create(const StrategyEntry& entry, const SceneView<
   const auto factory = entry.factory<S>();
   if (factory == nullptr)
     throw ConfigError("'" + entry.info.id + "' has no " + (sizeof(S) == 4 ? "float" : "double") + " version");
-  // A strategy within another one works with the threads of that one.
+  // A strategy within another one uses the outer one's threads.
   if (const std::uint32_t threads = threads_of(params); threads > 1) playback.use_threads(threads);
   return factory(scene, playback, std::move(topologies), params);
 }

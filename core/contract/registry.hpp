@@ -101,8 +101,8 @@ BuilderConfig suitable_builder(const Info& info, std::optional<BuildMethod> meth
                                std::optional<std::uint32_t> width, std::optional<std::uint32_t> leaf_size);
 
 /// Returns the reason why the strategy cannot play a scene of these bodies, as the end of a sentence that
-/// begins with its id; empty if it can. Checks pairs within a body, kinds of primitives, positions handed in
-/// frame by frame, and the range of keyframes.
+/// begins with its id; empty if it can. Checks pairs within a body, kinds of primitives, positions that are
+/// handed in frame by frame, and the range of keyframes.
 template <class S>
 std::string unsuitable_bodies(const Info& info, const Scene<S>& scene);
 
@@ -110,7 +110,7 @@ std::string unsuitable_bodies(const Info& info, const Scene<S>& scene);
 template <class S>
 Topologies build_topologies(const SceneView<S>& scene, Playback<S>& playback, const BuilderConfig& config);
 
-/// Makes an instance, and gives the playback the threads that a parameter `threads` asks for. Throws
+/// Makes an instance, and gives the playback as many threads as the parameter `threads` asks for. Throws
 /// ConfigError if the strategy does not exist in scalar S.
 template <class S>
 std::unique_ptr<Strategy<S>> create(const StrategyEntry& entry, const SceneView<S>& scene,

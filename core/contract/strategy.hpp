@@ -40,10 +40,10 @@ enum class Guarantee : std::uint8_t {
 enum class PositionUse : std::uint8_t {
   all,      ///< the driver evaluates every vertex before `advance`; its time is motion time
   fetched,  ///< the strategy fetches the positions that it reads; that time is part of its own phases
-  varying,  ///< one of the two, as `wants_all_positions` says before each frame
+  varying,  ///< one of the two; `wants_all_positions` decides before each frame
 };
 
-/// Properties that a strategy declares because its class does not show them.
+/// Properties that a strategy declares because they cannot be derived from its class.
 struct Declared {
   bool event_driven = false;  ///< works at events instead of frames (implied by EventSource)
   bool continuous = false;    ///< bounds are valid between frames, too
@@ -102,8 +102,8 @@ struct Info {
   /// The largest scene on which the strategy runs, in primitive pairs of one body pair (quadratic
   /// contestants); 0: any.
   std::uint64_t max_primitive_pairs = 0;
-  /// The largest magnitude of a coordinate, of positions during the whole motion and of rays, with which the
-  /// contestant works; what reaches beyond is refused. Infinite: everything admissible
+  /// The largest magnitude of a coordinate with which the contestant works: of positions during the whole
+  /// motion, and of rays. Larger ones are refused. Infinite: everything admissible
   /// (core/motion/admissible.hpp).
   double max_coordinate = std::numeric_limits<double>::infinity();
   /// Calls a peer library's own, uncertified test of two moving features (core/continuous/impact.hpp) and
@@ -238,10 +238,10 @@ class Strategy {
     query.find_swept_pairs(t0, t1, before, out);
   }
 
-  /// Answers rays at t, hits[i] being the answer to rays[i]: all primitives of the scene, whatever its pairs
-  /// of bodies. Positions are fetched as needed. Throws std::invalid_argument, naming the ray, if a
-  /// coordinate or direction is not finite or beyond admissible_magnitude<S>, or a length is negative or not
-  /// a number.
+  /// Answers rays at t, hits[i] being the answer to rays[i]. Rays meet all primitives of the scene, also
+  /// those of bodies in no pair. Positions are fetched as needed. Throws std::invalid_argument, naming the
+  /// ray, if a coordinate or direction is not finite or beyond admissible_magnitude<S>, or if a length is
+  /// negative or not a number.
   void hits_at(double t, RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits) {
     AnswersRays<S>& able_to = able(abilities().rays, "rays");
     if (hits.size() != rays.size())
@@ -298,12 +298,12 @@ class Strategy {
   /// Describes in words the choices made since `reset` by a strategy that chooses; empty for all others.
   virtual std::string choice() const { return {}; }
 
-  /// Makes this an instance whose time is taken: it leaves out the counts that take work of their own, which
-  /// are those within a peer's library and those of bodies that rays did not enter. Before the first `reset`.
+  /// Makes this a timed instance. It leaves out counts that cost extra work: those within a peer's library,
+  /// and those of bodies that rays did not enter. To be called before the first `reset`.
   virtual void be_timed() { timed_ = true; }
 
-  /// Returns everything counted since `reset`. The reset itself and, for a strategy that chooses, a change of
-  /// its choice are not counted, because they are not running costs. A timed instance leaves some out
+  /// Returns everything counted since `reset`. Not counted, because they are not running costs: the reset
+  /// itself and, for a strategy that chooses, a change of its choice. A timed instance leaves some counts out
   /// (be_timed).
   Counters counters() const {
     Counters table = counted();
@@ -417,7 +417,7 @@ class CountedStrategy : public Strategy<S> {
   /// counters (Counters::add).
   virtual void add_counts(Counters& /*table*/) const {}
 
-  /// Returns where queries of rays count the bodies that they enter or leave out; null for timed instances.
+  /// Returns where queries of rays count the bodies that they enter or skip; null for timed instances.
   RayBodies* ray_bodies() { return this->is_timed() ? nullptr : &ray_bodies_; }
 
   Counters count_;
@@ -445,7 +445,7 @@ class CountedStrategy : public Strategy<S> {
   RayBodies ray_bodies_;
 };
 
-// Compiled once, in strategy.cpp, and not with every strategy.
+// Compiled once, in strategy.cpp, instead of with every strategy.
 extern template class Strategy<float>;
 extern template class Strategy<double>;
 extern template class CountedStrategy<float>;

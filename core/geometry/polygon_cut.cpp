@@ -11,7 +11,7 @@
 namespace kbvh {
 namespace {
 
-/// Returns where the lexicographically smallest rotation of n items begins; item(i) is one of them. O(n).
+/// Returns where the lexicographically smallest rotation of n items begins; item(i) is item i. O(n).
 template <class Item>
 std::size_t smallest_rotation(std::size_t n, const Item& item) {
   std::size_t i = 0, j = 1, same = 0;
@@ -28,12 +28,12 @@ std::size_t smallest_rotation(std::size_t n, const Item& item) {
   return std::min(i, j);
 }
 
-/// How good it is to cut a corner off; smaller is better.
+/// How suitable a corner is for cutting off; smaller is better.
 enum class Rank : std::uint8_t {
   clean,    ///< an ear whose diagonal avoids all other corners
   touched,  ///< an ear with a corner on its diagonal
   flat,     ///< no area
-  convex,   ///< turns with the polygon, but is no ear
+  convex,   ///< turns with the polygon, but is not an ear
   any,
 };
 
@@ -118,9 +118,9 @@ class PolygonCutter::Work {
     });
   }
 
-  /// Returns whether certainly no two edges meet but neighbours at their common corner. Then every triangle
-  /// of a corner that turns with the polygon lies inside if no corner does, and stays an ear. Compares edges
-  /// that overlap in one coordinate.
+  /// Returns whether certainly no two edges meet except neighbours at their common corner. Then the triangle
+  /// of a corner that turns with the polygon lies inside if it contains no other corner, and stays an ear.
+  /// Compares edges that overlap in one coordinate.
   bool is_simple() {
     const std::size_t n = ids_.size();
     for (std::size_t i = 0; i < n; ++i)
@@ -168,7 +168,7 @@ class PolygonCutter::Work {
     return simple_ ? rank_among_corners(t) : rank_among_edges(t);
   }
 
-  /// Where no edges cross, one that enters a triangle has an end in it.
+  /// If no edges cross, an edge that enters a triangle has an end in it.
   Rank rank_among_corners(const std::size_t (&t)[3]) {
     auto next =
         std::lower_bound(sorted_.begin(), sorted_.end(), polygon_.bound_begin(),
@@ -215,8 +215,8 @@ class PolygonCutter::Work {
     do {
       const std::size_t b = next_[a];
       const bool left_b = turn(inner, t[1], b) >= 0;
-      // The line through the inner point and the tip is crossed; ahead of the point if this lies on the left
-      // of an edge that goes to the left.
+      // Counts crossings of the line through the inner point and the tip. A crossing is ahead of the point if
+      // the point lies on the left of an edge that goes to the left.
       if (left_a != left_b && (left_b ? turn(a, b, inner) : turn(b, a, inner)) > 0) inside = !inside;
       a = b;
       left_a = left_b;
@@ -272,7 +272,7 @@ class PolygonCutter::Work {
         continue;
       }
       if (best.rank > Rank::flat && !crosses) {
-        // Cuts elsewhere may have freed an ear that was none when it was considered.
+        // Cuts elsewhere may have made an ear of a corner that was none when it was considered.
         if (!all_are_new) {
           consider_all(best.tip);
           all_are_new = true;
@@ -303,7 +303,7 @@ class PolygonCutter::Work {
   std::vector<std::uint32_t> corners_;  ///< the result
   ProjectedPolygon polygon_;
   std::vector<std::size_t> next_, previous_;
-  std::vector<std::uint32_t> version_;  ///< [corner]: of its newest candidate; older ones do not count
+  std::vector<std::uint32_t> version_;  ///< [corner]: version of its newest candidate; older ones are ignored
   std::vector<Candidate> heap_;
   std::vector<bool> is_cut_off_;
   std::vector<std::uint32_t> sorted_;  ///< corners by ProjectedPolygon::along; may hold some that are cut off

@@ -6,8 +6,7 @@
 namespace kbvh {
 
 /// The largest coordinate magnitude for which the predicates and the triangle test are exact. Every finite S
-/// with
-/// |x| <= admissible_magnitude<S> is admissible, zeros and denormals included. The limit keeps triple
+/// with |x| <= admissible_magnitude<S> is admissible, including zeros and denormals. The limit keeps triple
 /// products of differences finite in double (6 * (2e100)^3 < 1e303; float's is far below), so that a filter
 /// never sees an infinity or NaN. Beyond the limit answers may be wrong; these functions do not check it.
 ///

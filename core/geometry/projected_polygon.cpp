@@ -65,7 +65,7 @@ void ProjectedPolygon::take(std::span<const double> points) {
       slack = std::max(slack, std::abs(along) * error + 8 * unit * (std::abs(here) + std::abs(shift)));
     }
   }
-  // Twice as much, also for the further point and for the roundings here.
+  // Doubled, to cover the further point and the roundings of this computation, too.
   slack_ = 2 * slack + tiny;
   const double length = std::sqrt(1 + slope[0] * slope[0] + slope[1] * slope[1]);
   for (std::size_t i = 0; i < n; ++i) {
@@ -140,7 +140,7 @@ void ProjectedPolygon::make_exact() {
     if (const scaled::OddMultiple value = scaled::odd_multiple(x); value.mantissa != 0)
       lowest = std::min(lowest, value.exponent);
   offsets_.resize(3 * n);
-  for (std::size_t i = 3 * n; i-- > 0;) {  // the first corner last
+  for (std::size_t i = 3 * n; i-- > 0;) {  // the first corner comes last
     const auto integer = [&](double x) {
       const scaled::OddMultiple value = scaled::odd_multiple(x);
       Integer result(value.mantissa);
@@ -162,7 +162,7 @@ void ProjectedPolygon::make_exact() {
     for (std::size_t axis = 0; axis < 3; ++axis)
       if (abs(area_[axis]) > abs(area_[axis_])) axis_ = axis;
   const std::size_t across[2] = {(axis_ + 1) % 3, (axis_ + 2) % 3};
-  // Four times as much, so that the further point is whole.
+  // Multiplied by four, so that the further point has integer coordinates.
   for (std::size_t side = 0; side < 2; ++side) {
     exact_seen_[side].resize(n + 1);
     for (std::size_t i = 0; i < n; ++i)

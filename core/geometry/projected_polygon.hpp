@@ -10,11 +10,11 @@ namespace kbvh {
 
 /// A polygon in the projection along its area vector N, with exact signs. With w the largest axis of N, a
 /// point p is seen at (p_s - p_w N_s / N_w, p_t - p_w N_t / N_w): a linear map whose kernel is N. Doubles
-/// with one common error bound decide most signs; integers, made at the first sign that is left, decide the
+/// with one common error bound decide most signs; integers, made when the first sign is left open, decide the
 /// others.
 class ProjectedPolygon {
  public:
-  /// Takes the corners [corner][3]; they must stay as they are. O(corners).
+  /// Takes the corners [corner][3], which must not change. O(corners).
   void take(std::span<const double> points);
 
   /// Returns whether the area vector is not zero. Without it there is no projection, and only `is_straight`
@@ -25,7 +25,7 @@ class ProjectedPolygon {
   /// Returns PolygonCut::bent.
   double bent() const { return bent_; }
 
-  /// Returns the turn of three corners as the polygon's own area turns: left (+1), right (-1), or none (0).
+  /// Returns the turn of three corners relative to the polygon's own: left (+1), right (-1), or none (0).
   int turn(std::size_t a, std::size_t b, std::size_t c);
 
   /// Returns a coordinate of a corner, off by at most `slack`.
@@ -33,16 +33,16 @@ class ProjectedPolygon {
   double slack() const { return slack_; }
   /// Returns whether the edges ab and cd are certainly apart, by their boxes.
   bool boxes_apart(std::size_t a, std::size_t b, std::size_t c, std::size_t d) const;
-  /// Remembers the box of a triangle; `beyond_bound` returns whether an edge is certainly apart from it. Of
-  /// `along`, it reaches from `bound_begin` to `bound_end`.
+  /// Stores the box of a triangle; `beyond_bound` returns whether an edge is certainly apart from it. In
+  /// terms of `along`, it extends from `bound_begin` to `bound_end`.
   void bound(const std::size_t (&triangle)[3]);
   bool beyond_bound(std::size_t a, std::size_t b) const;
   double bound_begin() const { return bound_[0].lower; }
   double bound_end() const { return bound_[0].upper; }
-  /// Returns whether a corner is at the place of one of a triangle's.
+  /// Returns whether a corner coincides with a corner of a triangle.
   bool coincides(std::size_t corner, const std::size_t (&triangle)[3]) const;
 
-  /// Makes a further point, inside a triangle on the line through its second corner and the middle of the
+  /// Creates a further point, inside a triangle on the line through its second corner and the middle of the
   /// other two; returns its number for `turn`.
   std::size_t place_inside(const std::size_t (&triangle)[3]);
 
@@ -62,7 +62,7 @@ class ProjectedPolygon {
   double bent_ = 0;
   std::size_t axis_ = 2;         ///< w
   std::vector<double> seen_[2];  ///< [corner, and one further point]
-  double slack_ = 0;             ///< no number in `seen_` is off by more; infinite: nothing is known
+  double slack_ = 0;             ///< error bound of the numbers in `seen_`; infinite: unknown
   Interval bound_[2] = {};
   bool is_exact_ = false;
   std::vector<Integer> offsets_;  ///< [corner][3] from the first corner, in units of a power of two

@@ -58,7 +58,7 @@ Verdict filtered(const RayLine& ray, const double* corners, RayMeeting& meeting)
   const Filtered height = volume(to[0], edge[2], edge[0]), slope = volume(ray.direction, edge[2], edge[0]);
   if (const int side = slope.sign(); side != undecided_sign && height.sign() == -side) return Verdict::miss;
   if (positive + negative != 3) return Verdict::open;
-  // `slope` has their sign, whether its own filter decides that or not.
+  // `slope` has the same sign, whether or not its own filter decides that.
   const double least = std::fabs(slope.value) - slope.bound;
   if (!(least > 4 * slope.bound) || height.sign() == undecided_sign) return Verdict::open;
   const double parameter = height.value / slope.value;
@@ -113,8 +113,8 @@ int compare(const Fraction& a, const Fraction& b) {
   if (b.exponent > a.exponent) right <<= unsigned(b.exponent - a.exponent);
   return left.compare(right);
 }
-/// Rounds a fraction that is not negative to nearest, whatever common factor its parts have: equal fractions
-/// are rounded alike.
+/// Rounds a fraction that is not negative to nearest. The result does not depend on common factors of its
+/// parts: equal fractions are rounded alike.
 double rounded(const Fraction& x) {
   if (x.numerator.is_zero()) return 0;
   const int shift = 64 - (int(msb(x.numerator)) - int(msb(x.denominator)));
@@ -123,7 +123,7 @@ double rounded(const Fraction& x) {
     divide_qr(Integer(x.numerator << unsigned(shift)), x.denominator, quotient, remainder);
   else
     divide_qr(x.numerator, Integer(x.denominator << unsigned(-shift)), quotient, remainder);
-  // 64 or 65 bits: below the rounding, the last one stands for all that follow.
+  // 64 or 65 bits: the last one is below the rounding, and represents all that follow.
   auto bits = static_cast<std::uint64_t>(quotient >> 1);
   if (!remainder.is_zero() || (quotient & 1) != 0) bits |= 1;
   return std::ldexp(double(bits), x.exponent - shift + 1);
@@ -144,11 +144,11 @@ struct ScaledPair {
     along.measure();
   }
 
-  /// Returns whether the ray misses the triangle, by signs alone; most pairs for which the filter is
-  /// open do, such as those of rays in the plane of a grid. `false` where the numbers are too long for it.
+  /// Returns whether the ray misses the triangle, by signs alone. Most pairs that the filter leaves open do,
+  /// such as those of rays in the plane of a grid. `false` if the numbers are too long for it.
   bool misses_by_signs() const {
-    // Differences have one bit more: `determinant_sign` takes those of 60 bits, and a determinant of three of
-    // 168 bits is below 6 * 2^507.
+    // Differences have one bit more: `determinant_sign` takes those of 60 bits, and a determinant of three
+    // numbers of 168 bits is below 6 * 2^507.
     const int width = std::max(points.width, along.width);
     if (width <= 60) return misses<std::int64_t>();
     return width <= 168 && misses<scaled::Int512>();
@@ -170,7 +170,7 @@ struct ScaledPair {
       negative = negative || side < 0;
       if (positive && negative) return true;
     }
-    // Behind the origin; or, where all three are zero, parallel to the plane and not in it.
+    // Behind the origin; or, if all three are zero, parallel to the plane and not in it.
     const int height = scaled::determinant_sign(corner[0], corner[1], corner[2]);
     if (height != 0) return height != (positive ? 1 : negative ? -1 : 0);
     return !positive && !negative && misses_in_plane(corner, direction);
@@ -215,7 +215,7 @@ struct ExactPair {
     exponent = pair.points.width == 0 || pair.along.width == 0 ? 0 : pair.points.lowest - pair.along.lowest;
   }
 
-  /// Returns the first parameter at which they meet, whatever the ray's length; sets RayMeeting::corners.
+  /// Returns the first parameter at which they meet, for a ray of any length; sets RayMeeting::corners.
   std::optional<Fraction> meeting(std::uint8_t& corners) const {
     const Vector &a = corner[0], &b = corner[1], &c = corner[2];
     const Integer volumes[3] = {dot(direction, cross(b, c)), dot(direction, cross(c, a)),
@@ -255,7 +255,7 @@ struct ExactPair {
     return first;
   }
 
-  /// The same for the segment from p to q, which lies in one plane with the ray.
+  /// Does the same for the segment from p to q, which lies in one plane with the ray.
   std::optional<Fraction> edge(const Vector& p, const Vector& q) const {
     const Vector along = q - p, turn = cross(direction, along);
     if (const std::size_t k = axis_of(turn); k < 3) {
@@ -310,7 +310,7 @@ bool ray_meets_triangle(const RayLine& ray, const double* corners, RayMeeting& m
 
 bool meets_at_same_corners(const RayLine& ray, const double* met, const RayMeeting& meeting,
                            const double* other, RayMeeting& known) {
-  unsigned shared = 0, also = 0;  // corners of the one that the other has, and the other way round
+  unsigned shared = 0, also = 0;  // corners of each triangle that the other one has, too
   known = meeting;
   known.corners = 0;
   for (int c = 0; c < 3; ++c)

@@ -89,7 +89,7 @@ int determinant_sign(const Integer* a, const Integer* b, const Integer* c) {
   return sign_of(determinant);
 }
 
-/// The same for integers below 2^61: minors are below 2^123 and the sums of the half products below 3 *
+/// Does the same for integers below 2^61: minors are below 2^123 and the sums of the half products below 3 *
 /// 2^125. Everything fits into 128 bits except the determinant, which is kept as high * 2^64 + low.
 template <>
 inline int determinant_sign(const std::int64_t* a, const std::int64_t* b, const std::int64_t* c) {

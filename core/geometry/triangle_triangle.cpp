@@ -12,7 +12,7 @@
 // Three stages; core/geometry/kernels/triangles.cpp has the first two for many pairs at once:
 //   1. signs:    on which sides of each triangle's plane the other's corners lie (filtered), rejecting most
 //                pairs;
-//   2. decision: from the 6 signs alone, which 2 edge-edge orientations tell whether the two intervals that
+//   2. decision: from the 6 signs alone, which 2 edge-edge orientations decide whether the two intervals that
 //                the triangles cut out of the planes' common line overlap;
 //   3. the rest: coplanar and degenerate input, by dimension, on exact signs.
 

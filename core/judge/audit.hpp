@@ -26,14 +26,14 @@ struct Audit {
   void add(const Audit& other);
 };
 
-/// Whether an audit sums the surface areas of bounds. The areas of k-DOPs take most of the time of an audit.
+/// Whether an audit sums the surface areas of bounds. For k-DOPs the areas take most of the audit's time.
 enum class Areas : std::uint8_t { summed, left_out };
 
 /// Audits topology, validity and tightness of one body against its current positions [vertex][3]. Cost for
 /// boxes: O(nodes + vertices). Volumes (`view.volumes`) are queried about every vertex below every node,
 /// inner nodes included: O(nodes + vertices x depth). A volume counts as tight if it equals a volume fitted
-/// directly. `sound` is a topology that passed the check before, so that an equal one is not
-/// checked again, or null.
+/// directly. `sound` is a topology that has passed the check, or null; an equal topology is not checked
+/// again.
 template <class S>
 Audit audit(const AuditView& view, const Primitives& primitives, const S* positions,
             const Topology* sound = nullptr, Areas areas = Areas::summed);

@@ -8,8 +8,8 @@
 
 namespace kbvh {
 
-/// Finds the contacts between two times with a strategy as broad phase: swept pairs from the strategy, then
-/// the exact narrow phase on these.
+/// Finds the contacts between two times: the strategy's swept pairs are the broad phase, followed by the
+/// exact narrow phase.
 template <class S>
 class ContactSweep {
  public:
@@ -17,11 +17,11 @@ class ContactSweep {
   explicit ContactSweep(const Scene<S>& scene) : finder_(scene) {}
 
   /// Moves the playback to t by `seek` and appends the contacts on the way. Returns the number of pairs of
-  /// primitives that came to the narrow phase.
+  /// primitives that reached the narrow phase.
   template <class Seek>
   std::size_t find(Strategy<S>& strategy, Playback<S>& playback, double t, const Seek& seek,
                    ContactBuffer& out, PhaseTimes& times) {
-    timed(times.motion, [&] { playback.evaluate_all(); });  // current already, but for the first interval
+    timed(times.motion, [&] { playback.evaluate_all(); });  // already current, except in the first interval
     finder_.start(playback);
     const double from = playback.time();
     timed(times.update, [&] { strategy.start_sweep(from); });

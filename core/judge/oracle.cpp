@@ -18,8 +18,8 @@ namespace kbvh {
 
 namespace {
 
-/// The exact test of two primitives. A polygon is the union of its triangles. Where these have just been
-/// made, simple planar polygons are decided by even-odd, without them.
+/// The exact test of two primitives. A polygon is the union of its triangles. Just after polygons are cut,
+/// simple planar ones are decided by the even-odd rule instead, without the triangles.
 template <class S>
 class TrueMeeting {
  public:

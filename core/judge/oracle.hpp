@@ -11,9 +11,9 @@
 namespace kbvh {
 
 /// Returns all intersecting primitive pairs of the scene's body pairs at the playback's current time, sorted,
-/// by testing every pair exactly: no boxes, no sweep; it shares the triangle test with strategies, and the
-/// triangles of polygons. At the time at which polygons are cut, simple planar ones are decided by even-odd,
-/// without their triangles (polygon_region.hpp). O(primitives^2).
+/// by testing every pair exactly: no boxes, no sweep. It shares with strategies the triangle test and the
+/// triangles of polygons. At the time at which polygons are cut, simple planar ones are decided by the
+/// even-odd rule instead, without their triangles (polygon_region.hpp). O(primitives^2).
 template <class S>
 PairBuffer brute_force_pairs(const Scene<S>& scene, Playback<S>& playback);
 
@@ -35,10 +35,11 @@ class Oracle {
   /// Returns the sorted pairs at the playback's current time. The playback must follow the scene's own plans,
   /// and the script up to that time.
   const PairBuffer& pairs(Playback<S>& playback);
-  /// The same after the first `changes` changes of geometry that the script makes; `scene` is as these have
-  /// left it. Without such changes, as above. With them, pairs are kept in memory only.
+  /// Returns the pairs after the first `changes` changes of geometry that the script makes; `scene` is in the
+  /// state after these. Without such changes, the same as above. With them, pairs are kept in memory only.
   const PairBuffer& pairs(Playback<S>& playback, const Scene<S>& scene, std::uint32_t changes);
-  /// Returns the pairs at t after so many changes of geometry if `pairs` has returned them before; else null.
+  /// Returns the pairs at t after that many changes of geometry if `pairs` has returned them before; else
+  /// null.
   const PairBuffer* known(double t, std::uint32_t changes) const;
   /// Writes new entries to the cache, as the destructor does.
   void keep();

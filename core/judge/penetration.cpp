@@ -17,7 +17,7 @@ Vector between(const double* a, const double* b) {
   return {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
 }
 
-/// Returns the vector scaled to length 1; zero for none.
+/// Returns the vector scaled to length 1; zero for the zero vector.
 Vector unit(Vector v) {
   const double largest = std::max({std::abs(v[0]), std::abs(v[1]), std::abs(v[2])});
   if (!(largest > 0)) return {};

@@ -78,11 +78,11 @@ std::uint64_t hash(const PlanScript<S>& script) {
 template <class S>
 class ScriptCursor {
  public:
-  /// Starts at the script's beginning; nullptr is a script without steps.
+  /// Starts at the script's beginning; nullptr stands for a script without steps.
   explicit ScriptCursor(const PlanScript<S>* script) : script_(script) {}
 
-  /// Returns the step to perform after the query of the frame at t, or nullptr; call it for frames in order.
-  /// Throws std::invalid_argument if a step was passed over because its time is not a frame's.
+  /// Returns the step to perform after the query of the frame at t, or nullptr. Call it for all frames in
+  /// order. Throws std::invalid_argument if a step was skipped because its time is not that of a frame.
   const typename PlanScript<S>::Step* at(double t) {
     if (script_ == nullptr || next_ == script_->steps.size()) return nullptr;
     const auto& step = script_->steps[next_];

@@ -104,7 +104,7 @@ bool PolygonRegion::apart_by_boxes(const PolygonRegion& other) const {
 
 bool PolygonRegion::meets(const PolygonRegion& other) const {
   if (apart_by_boxes(other)) return false;
-  // Where two regions meet, an end of what they share lies on the boundary of one.
+  // Where two regions meet, an end of their common part lies on the boundary of one of them.
   for (std::size_t i = 0; i < corners_.size(); ++i)
     if (other.meets_segment(corners_[i], corners_[(i + 1) % corners_.size()])) return true;
   for (std::size_t i = 0; i < other.corners_.size(); ++i)
@@ -118,7 +118,7 @@ bool PolygonRegion::meets(const RayLine& ray) const {
   if (std::isfinite(ray.length)) {
     length = Rational(ray.length);
   } else {
-    // Past the box on every axis along which the ray moves.
+    // A point beyond the box on every axis along which the ray moves.
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if (ray.direction[axis] == 0) continue;
       const Rational far = abs(Rational(lower_[axis]) - Rational(ray.origin[axis])) +

@@ -13,11 +13,11 @@
 namespace kbvh {
 
 /// A simple planar polygon as its even-odd region with its boundary, in rational arithmetic: the truth about
-/// polygons that does not depend on how they are cut.
+/// a polygon, independent of how it is cut.
 class PolygonRegion {
  public:
-  /// Makes the region of a polygon with corners [corner][3]; nothing unless the polygon is planar, has an
-  /// area, and its edges meet only at common corners. O(corners^2).
+  /// Makes the region of a polygon with corners [corner][3]; nothing unless the polygon is planar, has a
+  /// nonzero area, and its edges meet only at common corners. O(corners^2).
   static std::optional<PolygonRegion> of(std::span<const std::array<double, 3>> corners);
 
   /// Returns whether two regions share a point. O(corners^2).
@@ -49,13 +49,12 @@ class PolygonRegions {
  public:
   PolygonRegions(const Scene<S>& scene, const Playback<S>& playback) : scene_(&scene), playback_(&playback) {}
 
-  /// Returns whether a polygon has just been cut, at the playback's time, so that a region may decide about
-  /// it.
+  /// Returns whether a polygon was cut at the playback's current time, so that a region may decide about it.
   bool decides(std::uint32_t body, std::uint32_t primitive) const {
     const PolygonCuts& cuts = scene_->bodies[body].primitives.cuts;
     return cuts.contains(primitive) && cuts.times[primitive] == playback_->time();
   }
-  /// Returns a polygon's region, null if it has none. All positions must be current.
+  /// Returns a polygon's region; null if it has none. All positions must be current.
   const PolygonRegion* region(std::uint32_t body, std::uint32_t primitive);
 
  private:

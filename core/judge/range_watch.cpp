@@ -20,7 +20,7 @@ Piece<S> last_line(const FlightPlans<S>& plans, std::uint32_t vertex, int axis) 
   return plans.piece_after(vertex, axis, last_double);
 }
 
-/// Thrown where a contestant's own range ends; `what` is the end of a sentence that begins with its id.
+/// Thrown when a contestant's own range is exceeded; `what` is the end of a sentence that begins with its id.
 struct BeyondContestant : std::invalid_argument {
   BeyondContestant(const std::string& id, const std::string& why)
       : std::invalid_argument("'" + id + "' " + why), clause(why) {}
@@ -63,7 +63,7 @@ double RangeWatch<S>::stays_until(const FlightPlans<S>& plans, std::uint32_t ver
   return until;
 }
 
-/// Refuses a vertex that is out of the range at t.
+/// Throws for a vertex that is out of the range at t.
 template <class S>
 void RangeWatch<S>::check_vertex(const FlightPlans<S>& plans, std::uint32_t body, std::uint32_t vertex,
                                  double t) const {
@@ -143,7 +143,7 @@ void RangeWatch<S>::changed(const Playback<S>& playback, std::uint32_t body, std
 
 template <class S>
 void RangeWatch<S>::added(const Playback<S>& playback, const GeometryChange<S>& change) {
-  std::vector<std::uint32_t> next(playback.body_count());  // the last ids are the new ones, in order
+  std::vector<std::uint32_t> next(playback.body_count());  // the new ids come last, in order
   for (std::uint32_t body = 0; body < playback.body_count(); ++body)
     next[body] = playback.plans(body).vertex_count();
   for (const auto& vertex : change.vertices) --next[vertex.body];
@@ -192,7 +192,7 @@ template <class S>
 void check_played(const Scene<S>& scene, const PlanScript<S>& script, std::span<const double> frames) {
   if (frames.empty()) return;
   for (std::size_t f = 0; f < frames.size(); ++f) check_time(frames[f], "frame " + std::to_string(f) + " is");
-  if (script.empty()) return;  // keyframes are in the range, and so are all positions between them
+  if (script.empty()) return;  // keyframes, and so all positions between them, are in the range
   watch_script(scene, script, frames.back(), RangeWatch<S>());
 }
 

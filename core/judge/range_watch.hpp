@@ -15,7 +15,7 @@ namespace kbvh {
 template <class S>
 class RangeWatch {
  public:
-  /// Watches what is admissible for all.
+  /// Watches the range that is admissible for all contestants.
   RangeWatch() = default;
   /// Watches the range of a contestant.
   explicit RangeWatch(const Info& contestant);
@@ -27,12 +27,13 @@ class RangeWatch {
   /// Registers added vertices. O(change).
   void added(const Playback<S>& playback, const GeometryChange<S>& change);
   /// Throws std::invalid_argument with body, vertex, time and value if a vertex has left the range at t. O(1)
-  /// before the earliest time at which one may leave it; O(vertices) after that time, if the plan concerned
-  /// has been replaced.
+  /// before the earliest time at which a vertex may leave it. O(vertices) after that time, if the plan that
+  /// gave this time has been replaced.
   void check(const Playback<S>& playback, double t);
 
-  // What is given at run time, before it is applied: each throws std::invalid_argument with place and value
-  // if it is beyond the range of the contestant. O(1) for one that takes everything admissible.
+  // Check what is given at run time, before it is applied. Each throws std::invalid_argument with place and
+  // value if something is beyond the range of the contestant. O(1) for a contestant that takes everything
+  // admissible.
   void check_positions(std::uint32_t body, std::uint32_t vertices, const S* positions) const;
   void check_plans(std::span<const PlanChange<S>> changes) const;
   void check_added(const GeometryChange<S>& change) const;
@@ -41,25 +42,25 @@ class RangeWatch {
  private:
   bool narrow() const { return !contestant_.empty(); }
   void check_point(const S* point, const std::string& what) const;
-  /// Throws: something is at `where`, which is out of the range.
+  /// Throws for something at `where` that is out of the range.
   [[noreturn]] void refuse(const std::string& where) const;
   double stays_until(const FlightPlans<S>& plans, std::uint32_t vertex) const;
   void check_vertex(const FlightPlans<S>& plans, std::uint32_t body, std::uint32_t vertex, double t) const;
 
   double most_ = double(admissible_reach<S>);
-  std::string contestant_;                                       ///< empty: the range is what is admissible
+  std::string contestant_;                                       ///< empty: the admissible range
   double safe_until_ = std::numeric_limits<double>::infinity();  ///< an upper limit; plans may have changed
 };
 
 /// Throws std::invalid_argument if the scene cannot be played at these times (ascending) with these changes:
-/// a time beyond admissible_time, an invalid change, a vertex out of the admissible range when its plan is
-/// changed or at the last frame. Names vertex, time and value. Steps after the last frame are ignored.
-/// O(keyframes + changes), plus all positions of a body at times of many changes.
+/// for a time beyond admissible_time, an invalid change, or a vertex that is out of the admissible range when
+/// its plan is changed or at the last frame. Names vertex, time and value. Steps after the last frame are
+/// ignored. O(keyframes + changes), plus all positions of a body at times of many changes.
 template <class S>
 void check_played(const Scene<S>& scene, const PlanScript<S>& script, std::span<const double> frames);
 
-/// Returns why the range of a contestant does not contain the whole motion of a scene that `check_played`
-/// accepts, as the end of a sentence that begins with its id; empty if it does. O(1) for a contestant that
+/// Returns why the whole motion of a scene that `check_played` accepts does not fit into the range of a
+/// contestant, as the end of a sentence that begins with its id; empty if it does. O(1) for a contestant that
 /// takes everything admissible.
 template <class S>
 std::string out_of_range(const Info& contestant, const Scene<S>& scene, const PlanScript<S>& script,

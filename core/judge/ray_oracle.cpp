@@ -14,7 +14,7 @@ std::string text(const RayHit& hit) {
   return std::to_string(hit.body) + ":" + std::to_string(hit.primitive) + " at " + number_text(hit.parameter);
 }
 
-/// Returns the answer to a ray if there were no other primitive than that of `found`.
+/// Returns the answer to a ray as if there were no other primitive than that of `found`.
 template <class S>
 RayHit alone(const Scene<S>& scene, const Playback<S>& playback, const Ray<S>& ray, const RayHit& found) {
   if (found.body >= scene.bodies.size()) return {};

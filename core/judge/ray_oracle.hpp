@@ -8,9 +8,9 @@
 
 namespace kbvh {
 
-/// Answers rays at the playback's current time by testing every living polygon exactly: no boxes; it shares
-/// the exact test and comparison with strategies, and the triangles of polygons. At the time at which
-/// polygons are cut, it is even-odd that decides which simple planar ones a ray meets (polygon_region.hpp);
+/// Answers rays at the playback's current time by testing every living polygon exactly: no boxes. It shares
+/// with strategies the exact test, the comparison and the triangles of polygons. At the time at which
+/// polygons are cut, the even-odd rule decides which simple planar ones a ray meets (polygon_region.hpp);
 /// where the triangles disagree, the ray has a hit without a parameter. O(rays x primitives).
 template <class S>
 void brute_force_hits(const Scene<S>& scene, Playback<S>& playback, RayQuery query,
@@ -30,8 +30,8 @@ struct RayCheck {
   bool holds() const { return missed + extra + misplaced == 0; }
 };
 
-/// Compares answers at the playback's current time with the closest hits `truth`: closest hits must be equal;
-/// of any hits, the primitive must be met at that parameter.
+/// Compares answers at the playback's current time with the closest hits `truth`. Closest hits must be equal;
+/// a reported "any hit" must be a primitive that the ray meets at that parameter.
 template <class S>
 RayCheck compare_hits(const Scene<S>& scene, const Playback<S>& playback, RayQuery query,
                       std::span<const Ray<S>> rays, std::span<const RayHit> found,

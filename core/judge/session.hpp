@@ -25,11 +25,11 @@ struct Contestant {
   BuilderConfig builder;  ///< ignored by strategies that build their own hierarchy
 };
 
-/// What a session's instance is for: an instance is timed by Strategy::be_timed.
+/// The purpose of a session's instance; timed instances are made by Strategy::be_timed.
 enum class Use : std::uint8_t { verified, timed };
 
-/// Drives one contestant on one scene. This is the only driver: verification, benchmarks and lessons all use
-/// it.
+/// Drives one contestant on one scene. This is the only driver, shared by verification, benchmarks and
+/// lessons.
 template <class S>
 class Session {
  public:
@@ -50,8 +50,8 @@ class Session {
   Session& operator=(const Session&) = delete;
 
   /// Starts at time t, with the scene's original plans and geometry: `restore`, then `start`; afterwards all
-  /// positions are current. If the geometry was changed, the instance is created anew, and references to the
-  /// old one become invalid. Throws std::invalid_argument and changes nothing if t is not finite or not
+  /// positions are current. If the geometry was changed, a new instance is created, and references to the old
+  /// one become invalid. Throws std::invalid_argument and changes nothing if t is not finite or not
   /// admissible (motion/admissible.hpp).
   void reset(double t) {
     PhaseTimes ignored;
@@ -76,7 +76,7 @@ class Session {
     seek(t);
   }
   /// Starts the strategy at the restored time: the beginning of a clip. Positions are evaluated unless the
-  /// strategy declares that it fetches those that it reads; the strategy's `reset` counts as update.
+  /// strategy declares that it fetches those that it needs. The strategy's `reset` counts as update.
   void start(PhaseTimes& times) {
     if (info_->positions != PositionUse::fetched) timed(times.motion, [&] { playback_.evaluate_all(); });
     timed(times.update, [&] { strategy_->reset(playback_.time()); });
@@ -92,7 +92,7 @@ class Session {
   }
   /// Moves to t, with positions if the strategy needs all of them, and advances the strategy. Throws
   /// std::invalid_argument and changes nothing if t is before the current time, not finite or not admissible,
-  /// or if a vertex has left the admissible range, or that of the contestant, by then.
+  /// or if a vertex has by then left the admissible range or that of the contestant.
   void advance(double t, PhaseTimes& times) {
     if (!(t >= playback_.time()))
       throw std::invalid_argument("cannot advance from t = " + number_text(playback_.time()) + " back to " +
@@ -115,11 +115,11 @@ class Session {
     return status;
   }
   /// Replaces `begun` and `ended` by the changes of an answer at the current time (Strategy::changes_at). All
-  /// of it counts as traversal, triangle tests included.
+  /// of this time counts as traversal, triangle tests included.
   void changes(Answer answer, PairBuffer& begun, PairBuffer& ended, PhaseTimes& times) {
     timed(times.traversal, [&] { strategy_->changes_at(playback_.time(), answer, begun, ended); });
   }
-  /// Answers rays at the current time (Strategy::hits_at). Everything counts as traversal. Throws
+  /// Answers rays at the current time (Strategy::hits_at). All of this time counts as traversal. Throws
   /// std::invalid_argument if a ray is beyond the range of the contestant.
   void hits(RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits, PhaseTimes& times) {
     watch_.check_rays(rays);
@@ -170,8 +170,8 @@ class Session {
   /// Returns the swept pairs of the last call of `contacts`; there must have been one.
   const PairBuffer& swept_pairs() const { return sweep_->pairs(); }
 
-  /// Applies the changes at the current time: all of them or, if one is not valid, none
-  /// (Playback::change_plans, or beyond the range of the contestant).
+  /// Applies the changes at the current time: all of them, or none if one is invalid (see
+  /// Playback::change_plans) or beyond the range of the contestant.
   void change_plans(std::span<const PlanChange<S>> changes, PhaseTimes& times) {
     watch_.check_plans(changes);
     timed(times.motion, [&] {
@@ -189,7 +189,7 @@ class Session {
     watch_.check_added(change);
     timed(times.motion, [&] { changing_->apply(change, playback_); });
     geometry_changed_ = true;
-    sweep_.reset();  // its features are of the old geometry
+    sweep_.reset();  // its features belong to the old geometry
     watch_.added(playback_, change);
     timed(times.geometry_changes, [&] { strategy_->geometry_changed(playback_.time(), change); });
   }

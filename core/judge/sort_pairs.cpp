@@ -6,7 +6,7 @@
 namespace kbvh {
 namespace {
 
-/// Sorts by the word `of` returns, stably, one counting pass for each byte in which pairs differ.
+/// Sorts stably by the word that `of` returns, in one counting pass for each byte in which pairs differ.
 template <class Word>
 void sort_by(PairBuffer& pairs, PairBuffer& scratch, Word of) {
   std::uint32_t differing = 0;

@@ -3,8 +3,8 @@
 
 namespace kbvh {
 
-/// Sorts as operator< does. With std::sort, sorting answers takes a third of a check, so long lists are
-/// sorted by digits.
+/// Sorts like operator<. With std::sort, sorting answers takes a third of a check, so long lists are sorted
+/// by digits.
 void sort_pairs(PairBuffer& pairs);
 
 }  // namespace kbvh

@@ -25,7 +25,7 @@ bool well_formed(const Scene<S>& scene, const PrimitivePair& pair) {
   return known(pair.body_a, pair.primitive_a) && known(pair.body_b, pair.primitive_b);
 }
 
-/// Sorts, counts and removes repetitions.
+/// Sorts, counts and removes duplicates.
 std::uint64_t sort_unique(PairBuffer& pairs) {
   sort_pairs(pairs);
   const auto end = std::unique(pairs.begin(), pairs.end());
@@ -82,7 +82,7 @@ class FrameChecker {
     if (!extra.empty()) violate("pair " + text(extra[0]) + " is reported but does not intersect");
   }
 
-  /// `judged`: also record the quality of this frame's boxes.
+  /// `judged`: whether to record the quality of this frame's boxes, too.
   void check_bounds(bool judged) {
     const Info& info = session_.info();
     Quality quality{.t = session_.playback().time()};
@@ -148,7 +148,7 @@ Verification verify(Session<S>& session, std::span<const double> frames, Oracle<
   PairBuffer pairs;
   PhaseTimes ignored;
   ScriptCursor<S> cursor(script);
-  // The oracle knows the truth of one script.
+  // The oracle knows the truth for one script.
   const bool known_truth = oracle.script() == (script ? hash(*script) : 0);
   std::uint32_t geometry_changes = 0;
   // Takes every n-th compared frame, so that there are no more samples than requested.

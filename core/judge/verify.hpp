@@ -27,7 +27,7 @@ struct Verification {
   std::uint64_t missed_candidates = 0;  ///< true pairs that were not candidates
   std::uint64_t missed = 0, extra = 0;  ///< confirmed pairs against the oracle
   std::uint64_t wrong_frames = 0;       ///< compared frames with a missed or an extra pair
-  /// The number of frames before the first compared one with a missed pair; nothing if there is none.
+  /// The number of frames before the first compared frame with a missed pair; nothing if there is none.
   std::optional<std::uint64_t> first_missed;
   Penetration missed_deepest;      ///< the largest of all missed pairs, of depth and of depth in edges
   double missed_depth_sum = 0;     ///< of their depths
@@ -56,8 +56,8 @@ std::string text(const PrimitivePair& pair);
 /// Runs a contestant over the frames and compares each frame with the oracle: candidates contain the truth;
 /// confirmed pairs equal it, each once and canonical; boxes that were read are valid, and tight if declared.
 /// `session` must be fresh. The script's times must be frames (std::invalid_argument); where geometry
-/// changes, the frame is compared before and after the change. Truth is recomputed if the oracle was made for
-/// another script or for none.
+/// changes, the frame is compared before and after the change. If the oracle was made for another script or
+/// for none, the truth is recomputed.
 template <class S>
 Verification verify(Session<S>& session, std::span<const double> frames, Oracle<S>& oracle,
                     const PlanScript<S>* script = nullptr, const VerifyOptions& options = {});

@@ -46,7 +46,7 @@ class ChangesChecker {
     }
     asked_[kind] = true;
   }
-  /// Fills `full_` by both full answers.
+  /// Fills `full_` with both full answers.
   void ask_in_full() {
     PairBuffer& candidates = full_[std::size_t(Answer::candidates)];
     candidates.clear();

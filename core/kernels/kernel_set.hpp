@@ -24,8 +24,8 @@ const std::vector<KernelSet>& supported_kernel_sets();
 /// Returns the active set: the widest supported set, unless the environment variable KBVH_KERNELS names
 /// another. Throws std::invalid_argument if that name is unknown or the set not supported.
 KernelSet active_kernel_set();
-/// Switches to another set, for tests that force one after the other. Affects objects created afterwards. No
-/// other thread may use kernels during the call. Throws std::invalid_argument if the set is not supported.
+/// Switches to another set, for tests that run one set after the other. Affects objects created afterwards.
+/// No other thread may use kernels during the call. Throws std::invalid_argument if the set is not supported.
 void use_kernel_set(KernelSet set);
 
 }  // namespace kbvh

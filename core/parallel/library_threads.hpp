@@ -9,15 +9,15 @@ namespace kbvh {
 
 class Pool;
 
-/// The threads of a library that uses TBB by itself. Such a library may only be able to set the number of
-/// threads for the whole process (Embree 3); here it sets that of the calls made within.
+/// The threads of a library that uses TBB itself. Such a library may only be able to set the number of
+/// threads for the whole process (Embree 3); here it applies only to the calls made within.
 class LibraryThreads {
  public:
   /// Throws std::invalid_argument like Workers.
   explicit LibraryThreads(std::uint32_t threads);
   ~LibraryThreads();
 
-  /// Returns whether the number is kept: kbvh was built with TBB. Otherwise the library has to be told.
+  /// Returns whether the number can be enforced: kbvh was built with TBB. Otherwise pass it to the library.
   static bool are_limited();
   /// Calls work() on the caller's thread; TBB's loops inside it use these threads.
   template <class Work>

@@ -1,6 +1,6 @@
-// The only file that knows TBB. Builds with ThreadSanitizer leave it uninstrumented (CMakeLists.txt): they do
-// not see how TBB hands tasks to its threads, and would report every task; what Workers orders by its own
-// atomics, they see.
+// The only file that uses TBB directly. Builds with ThreadSanitizer leave it uninstrumented (CMakeLists.txt):
+// they do not see how TBB hands tasks to its threads, and would report every task. They do see what Workers
+// orders by its own atomics.
 #include "core/parallel/pool.hpp"
 
 #include <algorithm>

@@ -16,7 +16,7 @@ class Pool {
   void within(void (*work)(void* context), void* context);
   /// Returns whether there is a pool: built with TBB.
   static bool exists();
-  /// Returns the most threads that can run at a time.
+  /// Returns the largest number of threads that can run at a time.
   static std::uint32_t most_threads();
 
  private:

@@ -25,8 +25,8 @@ std::uint32_t checked(std::uint32_t threads) {
 
 /// The jobs of one Workers object, one at a time, and the helpers: tasks of the pool that wait for jobs for a
 /// short while. Waking a sleeping thread takes as long as a whole phase of a small scene, so helpers stay
-/// awake from one phase of a frame to the next. A job never waits for a helper that has not come: the caller
-/// works as well, and leaves only when all items are done.
+/// awake from one phase of a frame to the next. A job never waits for a helper that has not arrived: the
+/// caller works as well, and leaves only when all items are done.
 class Workers::Jobs {
  public:
   explicit Jobs(std::uint32_t threads)
@@ -47,7 +47,7 @@ class Workers::Jobs {
     wake_helpers(count);
     work(0);
     job_.fetch_add(1);  // closed: even
-    // A helper may have lost its core: then it needs this one, perhaps.
+    // A helper may have lost its core, and may need this one.
     for (std::uint32_t spins = 0; inside_.load() != 0; ++spins)
       spins < 256 ? relax() : std::this_thread::yield();
     if (failure_) std::rethrow_exception(failure_);
@@ -61,7 +61,7 @@ class Workers::Jobs {
  private:
   using Clock = std::chrono::steady_clock;
   static constexpr std::chrono::microseconds patience{1000};
-  /// What belongs to one runner: its items that nobody has begun, [begin, end) in one word, and whether a
+  /// The data of one runner: its items that have not been started, [begin, end) in one word, and whether a
   /// helper has its number.
   struct alignas(cache_line) Slot {
     std::atomic<std::uint64_t> left{0};
@@ -72,7 +72,7 @@ class Workers::Jobs {
   }
   static constexpr std::uint32_t no_item = ~std::uint32_t(0);
   enum class From : std::uint8_t { front, back };
-  /// Takes an item of a runner's; returns `no_item` if all have been begun.
+  /// Takes one of a runner's items; returns `no_item` if all have been started.
   static std::uint32_t take(Slot& slot, From from) {
     std::uint64_t left = slot.left.load(std::memory_order_relaxed);
     for (;;) {
@@ -107,14 +107,14 @@ class Workers::Jobs {
       const std::uint64_t job = job_.load();
       if (job % 2 == 1 && job != last) {
         inside_.fetch_add(1);
-        if (job_.load() == job) work(slot + 1);  // else it closed meanwhile
+        if (job_.load() == job) work(slot + 1);  // otherwise it has closed meanwhile
         inside_.fetch_sub(1);
         last = job;
         idle_since = Clock::now();
       } else if (Clock::now() - idle_since > patience) {
         break;
       } else {
-        relax();  // a helper that yielded would lose its core for milliseconds where cores are wanted
+        relax();  // on a busy machine, a helper that yields would lose its core for milliseconds
       }
     }
     slots_[slot + 1].taken.store(false);
@@ -148,7 +148,7 @@ class Workers::Jobs {
 
   Pool pool_;
   std::uint32_t helpers_;
-  std::unique_ptr<Slot[]> slots_;  ///< [runner]; the caller's is the first
+  std::unique_ptr<Slot[]> slots_;  ///< [runner]; the caller's comes first
   Call call_ = nullptr;
   const void* context_ = nullptr;
   std::exception_ptr failure_;

@@ -17,11 +17,11 @@ struct alignas(cache_line) OwnCount {
 };
 
 /// The threads that share the work of one object: the caller's, and those of TBB's pool, which all objects of
-/// the process share. Without TBB, and for one thread, the caller does all work itself.
+/// the process share. Without TBB, or with one thread, the caller does all work itself.
 ///
 /// Results must not depend on which thread did what. Callers cut their work into numbered items, each item
-/// writes to a place of its own, and the places are read in the order of the items: the answer is then that
-/// of one thread, to the last bit and in the same order.
+/// writes to its own place, and the places are read in the order of the items. The answer is then the same as
+/// with one thread, to the last bit and in the same order.
 class Workers {
  public:
   /// Throws std::invalid_argument for 0 threads, and for more than `most_threads()`.
@@ -34,13 +34,14 @@ class Workers {
   bool several() const { return threads_ > 1; }
 
   /// Calls work(item, runner) once for each item in [0, count), and returns when all calls have returned.
-  /// `runner`, in [0, threads()), is the same for no two calls that run at the same time: it selects memory
-  /// for temporary use. Each runner has an equal range of consecutive items, the same in every call with the
-  /// same count, and takes them in ascending order; what it wrote in the last call is then in its cache. A
-  /// runner without items of its own takes others' last ones. Items should be several times more than threads
-  /// and last microseconds at least; there are fewer than 2^32. What one call wrote may be read after the
-  /// return. The first exception of a call is passed on after the others have returned; items not yet begun
-  /// are then left out. Allocates nothing itself (TBB keeps a pool of small blocks).
+  /// `runner`, in [0, threads()), differs between calls that run at the same time: it selects memory for
+  /// temporary use. Each runner has an equal range of consecutive items, the same in every call with the same
+  /// count, and takes them in ascending order; the data that it wrote in the last call is then in its cache.
+  /// A runner that has finished its own items takes the last ones of others. There should be several times
+  /// more items than threads, each of at least some microseconds; there are fewer than 2^32. Data written by
+  /// one call may be read after the return. The first exception of a call is passed on after the others have
+  /// returned; items not yet started are then left out. Allocates nothing itself (TBB keeps a pool of small
+  /// blocks).
   template <class Work>
   void for_each(std::size_t count, Work&& work) {
     if (!several() || count < 2) {
@@ -68,12 +69,12 @@ class Workers {
   std::unique_ptr<Jobs, LeaveJobs> jobs_;
 };
 
-/// Returns the most threads that can run at a time: those of this machine that the process may use, 1 without
-/// TBB.
+/// Returns the largest number of threads that can run at a time: those of this machine that the process may
+/// use, or 1 without TBB.
 std::uint32_t most_threads();
 
-/// Returns the parameter by which a strategy is asked for threads. More than `most_threads()` are refused: a
-/// result would name threads that were not used. `what` names the work that they share.
+/// Returns the parameter that sets a strategy's number of threads. More than `most_threads()` are refused,
+/// because a result would name threads that were not used. `what` names the work that the threads share.
 Parameter threads_parameter(const std::string& what);
 /// Returns the value of that parameter; 1 if the strategy has none.
 std::uint32_t threads_of(const Params& params);

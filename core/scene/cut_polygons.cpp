@@ -8,7 +8,7 @@ namespace {
 
 constexpr double counts_as_bent = 1e-6;
 
-/// Returns the first polygon from p on that is to be cut; the number of primitives if there is none.
+/// Returns the first polygon to be cut, from p on; the number of primitives if there is none.
 std::uint32_t next_uncut(const Primitives& primitives, std::uint32_t p) {
   if (primitives.kind != PrimitiveKind::polygons) return primitives.count();
   while (p < primitives.count() && (primitives[p].size() <= 3 || primitives.cuts.contains(p))) ++p;

@@ -4,8 +4,8 @@
 
 namespace kbvh {
 
-/// What was found when polygons of more than three corners were cut. Coordinates from files are rounded: a
-/// polygon counts as bent from a millionth of its size on.
+/// The findings of cutting polygons of more than three corners. Coordinates from files are rounded, so a
+/// polygon counts as bent only from a millionth of its size on.
 struct CutFindings {
   std::uint64_t cut = 0;
   std::uint64_t bent = 0;      ///< not planar
@@ -17,10 +17,10 @@ struct CutFindings {
 };
 
 /// Cuts every polygon of more than three corners that has not been cut yet into triangles, at the positions
-/// of its body's first keyframe (of a body whose positions are handed in: those it was made with). From then
-/// on the polygon is the union of these triangles, at every time: for pairs, spans and rays. The rule is
-/// PolygonCutter's (core/geometry/polygon_cut.hpp). A scene must be cut before it is played. The scene must
-/// be valid (`validate`).
+/// of its body's first keyframe (for a body whose positions are handed in: those with which it was made).
+/// From then on the polygon is the union of these triangles, at every time: for pairs, spans and rays. The
+/// rule is PolygonCutter's (core/geometry/polygon_cut.hpp). A scene must be cut before it is played. The
+/// scene must be valid (`validate`).
 template <class S>
 CutFindings cut_polygons(Scene<S>& scene);
 

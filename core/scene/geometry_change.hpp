@@ -44,11 +44,10 @@ class ChangingScene {
   const Scene<S>& scene() const { return scene_; }
 
   /// Applies the change to the scene and to the playback, at the playback's time; polygons are cut at their
-  /// positions then. Throws
-  /// std::invalid_argument that names the first error, and changes nothing: bodies, vertices or primitives
-  /// that do not exist or were removed, primitives without vertices, removed vertices that a primitive uses,
-  /// items removed twice, numbers that are not finite or not admissible. Amortised O(change), but O(body) at
-  /// the first removal of vertices of a body.
+  /// positions at that time. Throws std::invalid_argument that names the first error, and changes nothing:
+  /// bodies, vertices or primitives that do not exist or were removed, primitives without vertices, removed
+  /// vertices that a primitive uses, items removed twice, numbers that are not finite or not admissible.
+  /// Amortised O(change), but O(body) at the first removal of vertices of a body.
   void apply(const GeometryChange<S>& change, Playback<S>& playback);
 
   /// Throws std::invalid_argument if a plan is given to a removed vertex.
@@ -68,7 +67,7 @@ class ChangingScene {
   std::vector<BodyState> bodies_;
 };
 
-/// The effects of a change on one body, after the scene shows it.
+/// The effects of a change on one body, after the change is visible in the scene.
 struct BodyChange {
   std::uint32_t body = 0;
   std::uint32_t first_vertex = 0, first_primitive = 0;  ///< ids from here on are new

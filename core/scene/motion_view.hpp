@@ -42,8 +42,8 @@ class SampledMotion {
   bool all_current(std::uint32_t body) const { return playback_->all_current(body); }
   /// Returns the number of positions evaluated on demand since the playback was created.
   std::uint64_t fetched() const { return playback_->fetched(); }
-  /// Returns the driver's threads, which are the strategy's while it is called: several only if its parameter
-  /// `threads` asks for them, or that of the strategy of which it is a part.
+  /// Returns the driver's threads, which belong to the strategy while it is called. There are several only if
+  /// its parameter `threads`, or that of the strategy that contains it, asks for them.
   Workers& workers() const { return playback_->workers(); }
 
  protected:
@@ -94,9 +94,9 @@ class SegmentMotion : public SteppedMotion<S> {
   }
   /// Returns whether no vertex of the body has its own plan. A segment then looks the same at every play.
   bool as_in_the_scene(std::uint32_t body) const { return !this->playback_->plans(body).has_own_plans(); }
-  /// Returns the positions [vertex][3] at a time from `lines_begin` to `lines_end`, truth B, one scalar past
-  /// the end readable: the keyframe itself where there is one, else evaluated into `room`. Throws
-  /// std::invalid_argument for other times. O(vertices), or O(1) at a keyframe.
+  /// Returns the positions [vertex][3] at a time from `lines_begin` to `lines_end`, truth B, readable up to
+  /// one scalar past the end: the keyframe itself if there is one at that time, else evaluated into `room`.
+  /// Throws std::invalid_argument for other times. O(vertices), or O(1) at a keyframe.
   const S* positions_on_lines(std::uint32_t body, double t, std::vector<S>& room) const {
     const FlightPlans<S>& plans = this->playback_->plans(body);
     if (!(t >= plans.lines_begin(time()) && t <= plans.lines_end(time())))

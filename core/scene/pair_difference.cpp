@@ -46,7 +46,7 @@ void PairDifference::find(std::span<const PrimitivePair> before, std::span<const
   ended.insert(ended.end(), left.before.begin(), left.before.end());
 }
 
-/// Passes over the pairs that both answers have at corresponding places, and returns all others.
+/// Skips the pairs that both answers have at corresponding places, and returns all others.
 PairDifference::Left PairDifference::walk(std::span<const PrimitivePair> before,
                                           std::span<const PrimitivePair> after) {
   const PrimitivePair* a = before.data();
@@ -62,7 +62,7 @@ PairDifference::Left PairDifference::walk(std::span<const PrimitivePair> before,
         ++b;
         continue;
       }
-      // The nearest partner of either pair decides which one is passed over.
+      // The nearest partner of either pair decides which one is skipped.
       const auto ahead = std::min<std::size_t>({reach, std::size_t(a_end - a), std::size_t(b_end - b)});
       std::size_t k = 1;
       while (k < ahead && !(a[k] == *b) && !(*a == b[k])) ++k;
@@ -167,7 +167,7 @@ bool PairSet::erase(const PrimitivePair& pair) {
   std::size_t hole = find(pair);
   if (slots_[hole] == free_slot) return false;
   --size_;
-  // Moves back every pair that the free slot would cut off from its place.
+  // Moves back every pair that the free slot would separate from its place.
   const std::size_t mask = slots_.size() - 1;
   for (std::size_t slot = (hole + 1) & mask; !(slots_[slot] == free_slot); slot = (slot + 1) & mask) {
     const std::size_t home = hash_of(slots_[slot]) & mask;
@@ -187,7 +187,7 @@ void PairSet::grow() {
 }
 
 void PairSet::sample(std::size_t most, PairBuffer& out) const {
-  // Those with the smallest hashes. About twice as many have one below the limit, and are sorted.
+  // Takes those with the smallest hashes. About twice as many have one below the limit, and are sorted.
   const double share = 2 * double(most) / double(std::max<std::size_t>(1, size_));
   const std::uint64_t limit = share < 1 ? std::uint64_t(share * 0x1p64) : ~std::uint64_t(0);
   const auto begin = std::ptrdiff_t(out.size());

@@ -6,10 +6,10 @@
 
 namespace kbvh {
 
-/// Finds the pairs that two answers do not share. Time is linear in the answers, in any order of pairs. Where
+/// Finds the pairs that two answers do not share. Time is linear in the answers, in any order of pairs. If
 /// both list most pairs in the same order, as consecutive answers of one structure do, they are walked side
-/// by side, and only the pairs around a difference are looked up in a table. Allocates only if a table is
-/// needed that is larger than ever before.
+/// by side, and only the pairs around a difference are looked up in a table. Allocates only if it needs a
+/// larger table than ever before.
 class PairDifference {
  public:
   /// Appends the pairs of `after` that `before` lacks to `begun`, and those of `before` that `after` lacks to
@@ -34,7 +34,7 @@ class PairDifference {
 /// The last answer of one kind, for answers as changes.
 class AnswerHistory {
  public:
-  /// Forgets the last answer: the next one begins as a whole.
+  /// Forgets the last answer: in the next one all pairs begin.
   void clear() { last_.clear(); }
   /// Returns an empty buffer for the next answer.
   PairBuffer& next() {
@@ -60,13 +60,13 @@ class AnswerHistory {
 class PairSet {
  public:
   void clear();
-  /// Return false, and change nothing, if the pair is in the set already, or is not in it.
+  /// Return false, and change nothing, if the pair is already in the set (insert) or not in it (erase).
   bool insert(const PrimitivePair& pair);
   bool erase(const PrimitivePair& pair);
   std::size_t size() const { return size_; }
   /// Appends all pairs, in no particular order. O(largest size so far).
   void append_to(PairBuffer& out) const;
-  /// Appends some pairs, at most `most`, spread over the set; they depend on the pairs of the set alone.
+  /// Appends some pairs, at most `most`, spread over the set; they depend only on the pairs of the set.
   /// O(largest size so far).
   void sample(std::size_t most, PairBuffer& out) const;
   std::size_t bytes() const { return slots_.capacity() * sizeof(PrimitivePair); }
@@ -75,7 +75,7 @@ class PairSet {
   std::size_t find(const PrimitivePair& pair) const;
   void grow();
 
-  PairBuffer slots_;  ///< a power of two; `free` where there is no pair
+  PairBuffer slots_;  ///< a power of two; `free` in empty slots
   std::size_t size_ = 0;
 };
 

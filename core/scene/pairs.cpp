@@ -142,7 +142,7 @@ std::size_t keep_intersecting(CandidateBlock<S>& candidates, PairBuffer& pairs, 
   return kept - begin;
 }
 
-/// The pairs that one thread tests at once: some ten microseconds.
+/// Number of pairs that one thread tests at once: some ten microseconds.
 constexpr std::size_t pairs_at_once = 4 * block;
 
 }  // namespace

@@ -9,18 +9,18 @@
 
 namespace kbvh {
 
-/// The pairs of a query whose library calls back from threads of its own: the caller's thread appends to the
-/// answer, each other one to a list of its own, and takes a lock only when it comes for the first time.
+/// The pairs of a query whose library calls back from its own threads. The caller's thread appends to the
+/// answer, every other thread to its own list; a thread takes a lock only on its first call.
 class PairsByThread {
  public:
-  /// What one thread finds: `pairs` is the answer or `own`; box tests since the last `collect`.
+  /// The results of one thread: `pairs` is the answer or `own`; box tests since the last `collect`.
   struct alignas(cache_line) Found {
     PairBuffer* pairs = nullptr;
     std::uint64_t box_tests = 0;
     PairBuffer own;
   };
 
-  /// Starts a query by the calling thread. No thread of an earlier one may be at work.
+  /// Starts a query by the calling thread. No thread of an earlier query may still be working.
   void start(PairBuffer& out) {
     static std::atomic<std::uint64_t> calls{0};
     call_ = ++calls;
@@ -46,8 +46,8 @@ class PairsByThread {
     return *known.found;
   }
   /// Moves the pairs that other threads have found since the last call to the end of the answer, and returns
-  /// the box tests that all have counted since. For the thread that started the query; no other may be at
-  /// work.
+  /// the box tests that all have counted since. For the thread that started the query; no other may be
+  /// working.
   std::uint64_t collect() {
     PairBuffer& out = *found_[0].pairs;
     std::uint64_t tests = 0;
@@ -66,7 +66,7 @@ class PairsByThread {
   }
 
  private:
-  std::uint64_t call_ = 0;  ///< a number of its own for each query of any object
+  std::uint64_t call_ = 0;  ///< a unique number for each query of any object
   std::size_t threads_ = 0;
   std::mutex mutex_;
   std::deque<Found> found_;

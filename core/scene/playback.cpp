@@ -10,7 +10,8 @@
 namespace kbvh {
 
 namespace {
-/// The vertices that one thread evaluates at once: 48 KiB of floats read and written, some microseconds.
+/// Number of vertices that one thread evaluates at once: 48 KiB of floats read and written, some
+/// microseconds.
 constexpr std::uint32_t vertices_at_once = 2048, none_gathered = vertices_at_once + 1;
 /// The same for vertices of a list: each costs 10 to 40 times as much.
 constexpr std::size_t listed_at_once = 256;
@@ -86,7 +87,8 @@ void Playback<S>::use_threads(std::uint32_t threads) {
   }
 }
 
-/// Cuts the work on the bodies for which `which(state)`: large ones in parts, small ones several at a time.
+/// Cuts the work on the bodies for which `which(state)` is true: large ones in parts, small ones several at a
+/// time.
 template <class S>
 template <class Which>
 void Playback<S>::cut_items(const Which& which) {
@@ -170,7 +172,7 @@ void Playback<S>::fetch_stale(BodyState& state, std::span<const std::uint32_t> v
     fetch_all(state);
     return;
   }
-  // A long list may exceed the limit at once: evaluated singly, a vertex costs 10 to 40 times as much.
+  // A single long list may exceed the limit: evaluated one by one, a vertex costs 10 to 40 times as much.
   const std::size_t most = std::max(64U, state.plans.vertex_count() / 16 - state.fetched);
   stale_.clear();
   for (std::uint32_t v : vertices)
@@ -227,8 +229,8 @@ void Playback<S>::change_plans(double t, std::span<const PlanChange<S>> changes)
 template <class S>
 void Playback<S>::restore_plans() {
   for (auto& state : bodies_) {
-    // Assigned even where no plan changed: the copy knows nothing of its segments (steps, translations) until
-    // it is asked, so no play profits from an earlier one.
+    // Assigned even if no plan changed: the copy has none of the data that is computed on demand for segments
+    // (steps, translations), so no play profits from an earlier one.
     const bool changed = state.plans.has_own_plans();
     state.plans = state.scene_plans;
     if (!changed) continue;

@@ -69,8 +69,8 @@ class Playback {
   /// Returns the number of positions evaluated on demand so far.
   std::uint64_t fetched() const { return fetched_; }
 
-  /// Evaluates positions on this many threads from now on, which the strategy may use, too, while it is
-  /// called (Workers). Throws std::invalid_argument like Workers.
+  /// From now on evaluates positions on this many threads. The strategy may use them, too, while it is called
+  /// (Workers). Throws std::invalid_argument like Workers.
   void use_threads(std::uint32_t threads);
   Workers& workers() { return workers_; }
 

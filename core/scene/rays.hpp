@@ -22,9 +22,9 @@ struct Ray {
 template <class S>
 void check_rays(std::span<const Ray<S>> rays);
 
-/// What is asked of a ray.
+/// The question about a ray.
 enum class RayQuery : std::uint8_t {
-  closest,  ///< the primitive that the ray meets first; of several, the smallest (body, primitive)
+  closest,  ///< the primitive that the ray meets first; among equals, the smallest (body, primitive)
   any,      ///< one of the primitives that the ray meets
 };
 
@@ -42,8 +42,9 @@ struct RayHit {
   bool operator==(const RayHit&) const = default;
 };
 
-/// Counts bodies of polygons by what queries of rays did with them, each body once a call. Bodies are entered
-/// front to back: a ray enters a body only where it may meet the body's box before the closest hit so far.
+/// Counts, for queries of rays, how bodies of polygons were treated, each body once a call. Bodies are
+/// entered front to back: a ray enters a body only where it may meet the body's box before the closest hit so
+/// far.
 struct RayBodies {
   std::uint64_t entered = 0;  ///< searched for at least one ray
   std::uint64_t hidden = 0;   ///< never searched: each ray that meets the box had found its answer before
@@ -62,7 +63,7 @@ class RaySearch {
     line_.length = double(ray.length);
   }
 
-  /// Tests a polygon; `positions` are those of its body. Returns whether the search is over: any hit is
+  /// Tests a polygon; `positions` are those of its body. Returns whether the search has ended: any hit is
   /// wanted, and there is one.
   bool offer(std::uint32_t body, std::uint32_t primitive, const PolygonTriangles& polygon, const S* positions,
              TriangleTestStats& stats);
@@ -77,7 +78,7 @@ class RaySearch {
   RayQuery query_;
   RayHit hit_;
   RayMeeting best_;
-  double corners_[9] = {};  ///< of the triangle that is met first
+  double corners_[9] = {};  ///< of the first triangle met
 };
 
 extern template class RaySearch<float>;

@@ -23,8 +23,8 @@ enum class PrimitiveKind : std::uint8_t {
 /// Returns the kind in words: polygons, points, control_nets.
 const char* name(PrimitiveKind kind);
 
-/// A polygon as the triangles whose union it is. Up to three corners are one triangle, in which fewer than
-/// three are a segment or a point; more have been cut (cut_polygons.hpp).
+/// A polygon as the triangles whose union it is. Polygons of up to three corners are one triangle; fewer than
+/// three make it a segment or a point. Larger ones have been cut (cut_polygons.hpp).
 class PolygonTriangles {
  public:
   /// Takes a polygon of at most three corners.
@@ -52,7 +52,7 @@ class PolygonTriangles {
   std::uint32_t last_, count_;
 };
 
-/// The triangles of a body's polygons of more than three corners, each made once.
+/// The triangles of a body's polygons of more than three corners, each cut once.
 struct PolygonCuts {
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
   std::vector<std::uint32_t> first;    ///< [primitive], of its triangles; none: not cut. May be shorter
@@ -80,7 +80,7 @@ struct Primitives {
   std::uint32_t removed_count = 0;
   PolygonCuts cuts;
 
-  /// Returns the number of ids, those of removed primitives included.
+  /// Returns the number of ids, including those of removed primitives.
   std::uint32_t count() const { return std::uint32_t(offsets.size() - 1); }
   std::uint32_t live_count() const { return count() - removed_count; }
   bool alive(std::uint32_t p) const { return removed.empty() || removed[p] == 0; }

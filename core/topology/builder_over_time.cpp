@@ -26,7 +26,7 @@ class SplitterOverTime {
       }
   }
 
-  /// Takes the order of the time whose halves have the least surface over all times.
+  /// Uses the order of the time whose halves have the least surface over all times.
   void median_split(std::uint32_t begin, std::uint32_t middle, std::uint32_t end) {
     best_.assign(order_.begin() + begin, order_.begin() + end);
     double least = std::numeric_limits<double>::infinity();

@@ -5,8 +5,8 @@
 
 namespace kbvh {
 
-/// Builds one topology for several times: leaves and nodes are as full as those of BuildMethod::median, but
-/// each split may follow the order along the longest axis at any of the times, and the one is taken whose two
+/// Builds one topology for several times. Leaves and nodes are as full as those of BuildMethod::median, but
+/// each split may follow the order along the longest axis at any of the times: it takes the order whose two
 /// parts have the least surface summed over all times (the temporal surface-area heuristic of Bittner &
 /// Meister 2015, here for splits at medians). `positions` are those of the body at each time, [vertex][3];
 /// `config` gives width and leaf size. Deterministic: ties are broken by the earlier time, then by primitive

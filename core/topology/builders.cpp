@@ -149,7 +149,7 @@ class BinaryBuilder {
         n += bins_[b].count;
         if (n == 0 || n == count) continue;
         const double cost = surface_area(box) * n + right_cost_[b + 1];
-        // Of equal costs, as on a line, the most even split.
+        // Among equal costs, as on a line, takes the most even split.
         const std::uint32_t larger = std::max(n, count - n);
         if (cost < best_cost || (cost == best_cost && larger < best_larger))
           best_cost = cost, best_axis = axis, best_bin = b, best_larger = larger;
@@ -226,7 +226,7 @@ class BinaryBuilder {
   std::vector<double> right_cost_;
 };
 
-/// The binary tree of a builder, as `collapse_into` reads it.
+/// The binary tree of a builder, in the form that `collapse_into` reads.
 struct BuiltTree {
   const std::vector<BinaryNode>* nodes;
   std::pair<std::uint32_t, std::uint32_t> children(std::uint32_t node) const {

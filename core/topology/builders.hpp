@@ -32,7 +32,7 @@ void check_builder(const BuilderConfig& config);
 template <class S>
 std::vector<Box<S>> primitive_boxes(const Primitives& primitives, const S* positions);
 
-/// Sorts the primitives within each leaf. Builders end with it: partitions leave the order within a leaf to
+/// Sorts the primitives within each leaf. Builders call it last: partitions leave the order within a leaf to
 /// the standard library, and a tree must not depend on that. O(n log leaf size).
 void sort_leaves(Topology& topology);
 

@@ -11,7 +11,7 @@
 
 namespace kbvh {
 
-/// Appends `count` children to a node, in one row; returns the first.
+/// Appends `count` adjacent children to a node; returns the first.
 inline std::uint32_t add_children(Topology& topology, std::uint32_t parent, std::uint32_t count) {
   const std::uint32_t first = topology.size();
   topology.nodes.resize(first + count);
@@ -33,9 +33,10 @@ inline Topology with_root(std::uint32_t width, std::uint32_t leaf_size) {
 }
 
 /// Collapses a binary tree into nodes of up to `topology.width` children: a node takes the two children of
-/// its binary node, then replaces the heaviest inner child (the first of equals) by that child's own two,
-/// until it is full (Wald et al. 2008). Nodes are numbered depth first: those of a subtree are
-/// contiguous, and leaves keep their order from left to right. `topology` comes from `with_root`. `Binary` is
+/// its binary node, then repeatedly replaces the heaviest inner child (the first of equals) by that child's
+/// own two children, until it is full (Wald et al. 2008). Nodes are numbered depth first: those of a subtree
+/// are contiguous, and leaves keep their order from left to right. `topology` comes from `with_root`.
+/// `Binary` is copied and has
 /// copied and has
 ///   children(node)   the two children, or {0, 0} for a leaf; node 0 is the root
 ///   weight(node)     of inner nodes
@@ -75,7 +76,7 @@ std::vector<std::uint32_t> collapse_into(Topology& topology, Binary binary) {
 /// Returns the number of leaves below each node of a topology in built layout: weights for `collapsed`.
 std::vector<double> leaves_below(const Topology& topology);
 
-/// Collapses a binary topology, however it was edited, into nodes of 4 or 8 children; `weights` (of its
+/// Collapses a binary topology, which may have been edited, into nodes of 4 or 8 children; `weights` (of its
 /// nodes) are for example the surfaces of the boxes. Replaces `node_of` by the binary node of each node of
 /// the result. Throws std::invalid_argument unless `binary` has width 2 and as many weights as nodes.
 Topology collapsed(const Topology& binary, std::uint32_t width, std::span<const double> weights,

@@ -37,7 +37,8 @@ void sort_nearest_last(std::vector<RayNode<Node>>& nodes, std::size_t first) {
 ///   children(Node, visit)                   calls visit(child) for each child of an inner node
 ///   bool leaf(Node, test)                   returns false for an inner node, else calls test(primitive) for
 ///                                           each primitive until one call returns true
-/// The caller owns the stack. Adds the box tests to `tests`. Returns whether the search is over (RaySearch).
+/// The caller owns the stack. Adds the box tests to `tests`. Returns whether the search has ended
+/// (RaySearch).
 template <class Tree, class S>
 bool follow_ray(const Tree& tree, RaySearch<S>& search, std::uint32_t body, const Primitives& primitives,
                 const S* positions, std::vector<RayNode<typename Tree::Node>>& stack, std::uint64_t& tests,
@@ -111,9 +112,9 @@ class RayBodyOrder {
     }
   }
 
-  /// Follows one ray: calls enter(body, first), `first` at the body's first time in this call, for the bodies
-  /// whose boxes the ray may meet at a parameter of at most limit() at that time, front to back, until a call
-  /// returns true. Bodies that lie behind what has been found are left out. Returns the number of box tests.
+  /// Follows one ray. Calls enter(body, first), where `first` marks the body's first time in this call, for
+  /// the bodies whose boxes the ray may meet at a parameter of at most limit() at that time, front to back,
+  /// until a call returns true. Skips bodies behind what has been found. Returns the number of box tests.
   template <class Limit, class Enter>
   std::uint64_t follow(const RayLine& line, const Limit& limit, const Enter& enter) {
     find_met(line, limit());
@@ -132,7 +133,7 @@ class RayBodyOrder {
     return bodies_.size();
   }
 
-  /// Adds what the call did with each body; null: nothing.
+  /// Adds how the call treated each body; null: nothing.
   void count(RayBodies* bodies) const;
 
   std::size_t bytes() const {
@@ -156,8 +157,8 @@ class RayBodyOrder {
 /// Answers rays over all bodies of a scene, front to back: the shared part of strategies without a wide
 /// hierarchy. box_of(body) returns a box around a body, empty if it has none. follow(body, search, tests)
 /// follows a ray through one body that consists of polygons, adds its box tests to `tests`, and returns
-/// whether the search is over. Positions are fetched of the bodies that a ray enters. Adds to `counts` what
-/// the call did with each body (null: not counted); returns the box tests.
+/// whether the search has ended. Fetches the positions of the bodies that a ray enters. Adds to `counts` how
+/// the call treated each body (null: not counted); returns the box tests.
 template <class S, class BoxOf, class Follow>
 std::uint64_t find_hits_by_body(const SceneView<S>& scene, const SampledMotion<S>& motion, RayQuery query,
                                 std::span<const Ray<S>> rays, std::span<RayHit> hits, RayBodyOrder& order,

@@ -28,7 +28,7 @@ Body<S> renumbered(const Body<S>& body, std::vector<std::uint32_t> old_primitive
       corners.push_back(new_vertex[v]);
     }
     result.primitives.add(corners);
-    // The cut stays as it is: a new one would decide ties by the new ids.
+    // Keeps the cut: a new one would break ties by the new ids.
     if (const PolygonCuts& cuts = body.primitives.cuts; cuts.contains(p)) {
       const PolygonTriangles triangles = body.primitives.triangles(p);
       corners.clear();

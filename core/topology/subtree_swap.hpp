@@ -34,9 +34,9 @@ class SubtreeSwap {
   /// changes nothing if the second is not a child of the first's sibling.
   void rotate(Topology& topology, std::uint32_t child, std::uint32_t grandchild, TopologyEdit& edit);
 
-  /// Exchanges the subtrees at two nodes of a topology of any width: their contents, and nothing else, lie
-  /// under other ids. Refuses what `swap` refuses, but for the width, and ids that are unused. `edit` is as
-  /// after `swap`. O(depth), and the two subtrees if their depth changes.
+  /// Exchanges the subtrees at two nodes of a topology of any width; only their contents get other ids.
+  /// Refuses what `swap` refuses, except the width, and unused ids. `edit` is as after `swap`. O(depth), and
+  /// the two subtrees if their depth changes.
   void exchange(Topology& topology, std::uint32_t first, std::uint32_t second, TopologyEdit& edit);
 
   std::size_t bytes() const {

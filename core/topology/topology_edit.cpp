@@ -184,7 +184,7 @@ void TopologyEditor::move_beside(Topology& topology, std::uint32_t node, std::ui
                                  TopologyEdit& edit) {
   const auto check = [&](bool holds, const std::string& what) {
     if (!holds)
-      throw std::invalid_argument("cannot move node " + std::to_string(node) + " beside node " +
+      throw std::invalid_argument("cannot move node " + std::to_string(node) + " next to node " +
                                   std::to_string(target) + ": " + what);
   };
   for (const std::uint32_t id : {node, target})

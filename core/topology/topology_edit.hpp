@@ -56,10 +56,10 @@ class TopologyEditor {
   /// Removes a primitive from its leaf.
   void remove(Topology& topology, std::uint32_t primitive, TopologyEdit& edit);
 
-  /// Moves the subtree at a node beside `target`: a new node with both as children takes the place of
+  /// Moves the subtree at a node next to `target`: a new node with both as children takes the place of
   /// `target`, which may be any node outside the subtree (reinsertion; Bittner et al. 2013). Leaves keep
-  /// their primitives. Throws std::invalid_argument and changes nothing if an id is unused, `target` lies in
-  /// the subtree, or the two have a parent without other children, or one of them is that parent.
+  /// their primitives. Throws std::invalid_argument and changes nothing if an id is unused, if `target` lies
+  /// in the subtree, if the two have a parent without other children, or if one of them is that parent.
   /// O(width + depth), and the two subtrees, whose depths are corrected.
   void move_beside(Topology& topology, std::uint32_t node, std::uint32_t target, TopologyEdit& edit);
 
@@ -113,9 +113,9 @@ class TopologyEditor {
   std::vector<std::uint32_t> open_;
 };
 
-/// Returns the leaf to insert a box at: starts from the root and always takes the child whose surface area
-/// grows least; of equal ones the smaller. `box_of(node)` returns the node's Box<S>. `none` for an empty
-/// topology. O(depth x width).
+/// Returns the leaf at which to insert a box: starts from the root and always takes the child whose surface
+/// area grows least; among equals, the smaller one. `box_of(node)` returns the node's Box<S>. `none` for an
+/// empty topology. O(depth x width).
 template <class S, class BoxOf>
 std::uint32_t leaf_for(const Topology& topology, const Box<S>& box, BoxOf&& box_of) {
   if (topology.empty()) return TopologyEditor::none;

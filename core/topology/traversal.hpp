@@ -31,12 +31,12 @@ struct NodePair {
 ///   void ensure(std::uint32_t node)         makes the node's bound valid at the query's time
 ///   B operator()(std::uint32_t node)        its bound, read only after `ensure`
 /// B is a Box<S> or any other type for which argument-dependent lookup finds `bool overlap(bound of a, bound
-/// of b)`: every BoundingVolume (core/geometry/volumes) has one. An overlap may be false only where no point
-/// is in both. The views of the two bodies may differ. (Stored boxes have their own query:
-/// wide_query.hpp.) Two inner nodes: descend both; one leaf: descend the other. The caller owns the
-/// stack, which grows as needed, so that no work is dropped and a frame allocates nothing. For a body with
-/// itself, each two leaves are visited in both orders. Adds
-/// the overlap tests to `tests`.
+/// of b)`: every BoundingVolume (core/geometry/volumes) has one. An overlap may be false only if no point is
+/// in both. The views of the two bodies may differ. (Stored boxes have their own query: wide_query.hpp.) Two
+/// inner nodes: descend both; one leaf: descend the other. The caller owns the stack, which grows as needed,
+/// so that no work is dropped and a frame allocates nothing. For a body with itself, each two leaves are
+/// visited in both orders. Adds the overlap tests to `tests`; tests that on_leaves adds count towards the
+/// budget, too.
 template <class ViewA, class ViewB, class OnLeaves>
 QueryStatus traverse(const Topology& a, ViewA&& bounds_a, const Topology& b, ViewB&& bounds_b,
                      std::vector<NodePair>& stack, std::uint64_t& tests, const Budget& budget,
@@ -45,11 +45,11 @@ QueryStatus traverse(const Topology& a, ViewA&& bounds_a, const Topology& b, Vie
   if (a.empty() || b.empty()) return {};
   bounds_a.ensure(0);
   bounds_b.ensure(0);
-  std::uint64_t made = 1;
+  const std::uint64_t before = tests++;
   if (overlap(bounds_a(0), bounds_b(0))) stack.push_back({0, 0});
   const TopologyNode* nodes_a = a.nodes.data();
   const TopologyNode* nodes_b = b.nodes.data();
-  while (!stack.empty() && made < budget.box_tests) {
+  while (!stack.empty() && tests - before < budget.box_tests) {
     const NodePair pair = stack.back();
     stack.pop_back();
     const TopologyNode node_a = nodes_a[pair.first], node_b = nodes_b[pair.second];
@@ -68,9 +68,8 @@ QueryStatus traverse(const Topology& a, ViewA&& bounds_a, const Topology& b, Vie
       for (std::uint32_t j = begin_b; j < end_b; ++j)
         if (overlap(bound, bounds_b(j))) stack.push_back({i, j});
     }
-    made += std::uint64_t(end_a - begin_a) * (end_b - begin_b);
+    tests += std::uint64_t(end_a - begin_a) * (end_b - begin_b);
   }
-  tests += made;
   return {stack.size()};
 }
 

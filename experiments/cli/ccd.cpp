@@ -36,7 +36,7 @@ compares with the given verdicts. Input: files with 8 rows per query in exact ra
 pairs of frames with lists of pairs, as in the NYU CCD benchmark (Wang et al. 2021). The table also has the peers' own
 continuous tests of the same two features, in floating point, if they are built in. DIR/ccd.json has the table; if DIR
 is the folder of a study, the study's report includes it. With --candidates, counts the pairs of features whose swept
-boxes meet between the two frames of each pair, beside published counts.
+boxes meet between the two frames of each pair, next to published counts.
 Exit codes: 0 all verdicts are right, 1 one is wrong, 2 wrong use or input, 3 other error.)";
 
 /// The verdicts and the speed of one test on the queries of one file.

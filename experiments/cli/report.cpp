@@ -31,7 +31,7 @@ same --out.)";
 constexpr const char* explore_examples = R"(Example:
   kbvh merge laptop server --out both && kbvh explore --out both
 writes both/explorer.html, a page of all results in both/results.jsonl: filters, performance profiles, ratios to any
-contestant, two commits or machines beside each other. It needs no network. `kbvh report` writes it, too, beside
+contestant, two commits or machines side by side. It needs no network. `kbvh report` writes it, too, next to
 the static report.)";
 
 /// Runs a script of the analysis folder on a results folder.

@@ -34,7 +34,7 @@ void read_processors(double& busy, double& steal) {
   std::fclose(file);
 }
 
-/// Returns the readings of all clocks, of which differences have a meaning.
+/// Returns the readings of all clocks; only their differences have a meaning.
 Effort reading() {
   Effort now;
   double busy = 0;

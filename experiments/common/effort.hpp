@@ -4,7 +4,7 @@
 
 namespace kbvh::experiments {
 
-/// What the machine did while something was timed. Numbers that this system does not tell are 0.
+/// The activity of the machine while something was timed. Numbers that the system does not provide are 0.
 struct Effort {
   double wall = 0;             ///< seconds
   double processor = 0;        ///< seconds that processors worked for this process, all its threads added up
@@ -18,7 +18,7 @@ struct Effort {
   bool several_threads() const { return processor > 1.05 * thread + 1e-4; }
 };
 
-/// Measures the effort from its construction on. Reading it takes about 50 us: not for single frames.
+/// Measures the effort from its construction on. A reading takes about 50 us: not for single frames.
 class EffortClock {
  public:
   EffortClock();

@@ -9,7 +9,7 @@ namespace kbvh::experiments {
 /// written; everything works without it.
 std::filesystem::path cache_folder();
 
-/// Returns the folder of input data that "data:" in plans stands for: $KBVH_DATA, else ../shared/data beside
+/// Returns the folder of input data that "data:" in plans stands for: $KBVH_DATA, else ../shared/data next to
 /// the source tree. It need not exist.
 std::filesystem::path data_folder();
 
@@ -17,7 +17,7 @@ std::filesystem::path data_folder();
 /// its installation. Throws io::InputError that names the places tried.
 std::filesystem::path analysis_folder();
 
-/// Returns data.py, which knows the data sets of the field: of the source tree, else of its installation.
+/// Returns data.py, the program for the data sets of the field: in the source tree, else in its installation.
 /// Throws io::InputError that names the places tried.
 std::filesystem::path data_program();
 

@@ -88,7 +88,8 @@ std::string own_file() {
   return "/proc/self/exe";
 }
 
-/// Computes a hash word by word: executables of developers have a hundred megabytes, and every run asks.
+/// Computes a hash word by word: executables of developers have a hundred megabytes, and every run hashes
+/// them.
 std::uint64_t hash_of_file(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   std::vector<std::uint64_t> block(std::size_t(1) << 16);
@@ -105,7 +106,7 @@ std::uint64_t hash_of_file(const std::string& path) {
   return state ^ bytes;
 }
 
-/// Returns the kernels in use; a wrong name in the environment is wrong use of the program.
+/// Returns the kernels in use; a wrong name in the environment counts as wrong use of the program.
 std::string kernels() {
   try {
     return name(active_kernel_set());

@@ -11,7 +11,7 @@ nlohmann::json machine();
 
 /// Returns the commit that was built, in full, or "unknown".
 std::string commit();
-/// Returns whether tracked files had been changed at the build.
+/// Returns whether tracked files had been changed when the program was built.
 bool dirty();
 
 /// Identifies the program's code in the keys of results: the commit; with changed files or without a

@@ -10,7 +10,7 @@ class Progress {
   ~Progress() { clear(); }
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
-  /// Replaces the line. Throws Interrupted where the user ends the work (core/base/interruption.hpp).
+  /// Replaces the line. Throws Interrupted if the user ends the work (core/base/interruption.hpp).
   void show(const std::string& line);
   /// Removes the line; call it before any other output.
   void clear();

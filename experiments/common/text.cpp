@@ -102,7 +102,7 @@ std::optional<std::string> nearest_of(std::string_view word, const std::vector<s
     if (candidate.size() > longest_name) continue;
     const std::string other = folded(candidate);
     const std::size_t edits = edits_between(wanted, other);
-    // A word of one or two letters is not a misspelling of one without a common letter.
+    // A word of one or two letters is not a misspelling of a word without a common letter.
     if (edits < fewest && edits < std::max(wanted.size(), other.size())) {
       fewest = edits;
       nearest = &candidate;

@@ -30,13 +30,14 @@ std::optional<std::uint64_t> parse_whole(std::string_view text);
 std::optional<std::pair<std::string, std::string>> parse_assignment(std::string_view text);
 
 /// Returns the first of `known` with the fewest edits from `word` (a character inserted, deleted, replaced,
-/// or two neighbours swapped), or nothing if that takes more than a third of the word's characters: then it
-/// is no misspelling. Letter case does not count, nor does '-' instead of '_'. A word that is the beginning
-/// of exactly one of them (three characters or more) matches that one.
+/// or two neighbours swapped), or nothing if that takes more than a third of the word's characters, because
+/// the word is then no misspelling. Letter case does not count, nor does '-' instead of '_'. A word of three
+/// or more characters that is the beginning of exactly one of them matches that one.
 std::optional<std::string> nearest_of(std::string_view word, const std::vector<std::string>& known);
 
 /// Composes "there is no scene 'x'; known are a, b; did you mean 'a'?". Known names that fill more than a
-/// line are left out; without a similar name, `otherwise` then takes their place ("`kbvh list` shows them").
+/// line are left out; if there is no similar name either, `otherwise` takes their place ("`kbvh list` shows
+/// them").
 std::string no_such(const std::string& kind, std::string_view word, const std::vector<std::string>& known,
                     const std::string& otherwise = "");
 

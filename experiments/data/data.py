@@ -227,7 +227,7 @@ def verify(folder: Path, names: list[str], part: str | None) -> int:
 
 
 def check() -> int:
-    """Checks the catalogue itself: every null has a reason, every checksum and address the form of one."""
+    """Checks the catalogue itself: every null has a reason, and every checksum and address is well formed."""
     catalogue = json.loads(CATALOGUE.read_text())
     problems: list[str] = []
     names = [one.get("name") for one in catalogue["sets"]]

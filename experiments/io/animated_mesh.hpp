@@ -30,7 +30,7 @@ struct AnimatedMesh {
   std::size_t added_keyframes = 0;        ///< between those of the file, so that chords follow curves
   std::size_t jumps = 0;                  ///< positions that change within one rounding of time
   std::size_t welded_vertices = 0;        ///< copies at seams whose faces use one vertex now (weld.hpp)
-  std::vector<std::string> notes;         ///< about skipped parts and doubtful ones, without the file's name
+  std::vector<std::string> notes;         ///< about skipped and doubtful parts, without the file's name
 
   std::size_t primitive_count() const { return primitive_offsets.size() - 1; }
   bool moving() const { return keyframe_times.size() > 1; }

@@ -20,9 +20,9 @@ std::uint64_t cache_checksum(std::string_view payload);
 /// no partial file. Throws InputError if the file cannot be written, or if a mesh has points or control nets.
 void save_cache(const std::vector<AnimatedMesh>& meshes, const std::filesystem::path& file);
 
-/// Reads the output of save_cache, equal in every field (except that a negative zero becomes zero), after all
-/// checks of finish(). Throws InputError if the file is missing, truncated, damaged (checksum), or of another
-/// version.
+/// Reads the output of save_cache, with every field unchanged (except that a negative zero becomes zero), and
+/// performs all checks of finish(). Throws InputError if the file is missing, truncated, damaged (checksum),
+/// or of another version.
 std::vector<AnimatedMesh> load_cache(const std::filesystem::path& file);
 
 }  // namespace kbvh::io

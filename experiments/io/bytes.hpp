@@ -42,8 +42,8 @@ std::string place_in_text(std::string_view text, std::size_t at);
 /// Formats the byte at `at` as "0xE9".
 std::string byte_text(std::string_view text, std::size_t at);
 
-/// Writes a file under a temporary name beside it and renames it: readers of `file` see all of it or nothing.
-/// Throws InputError if the folder is missing or not writable, or the disk is full.
+/// Writes a file under a temporary name next to it and renames it: readers of `file` see all of it or
+/// nothing. Throws InputError if the folder is missing or not writable, or the disk is full.
 void write_file_atomically(const std::filesystem::path& file, std::string_view bytes);
 
 /// Returns the number of type T stored little-endian at `at`, which needs no alignment.

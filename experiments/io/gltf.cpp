@@ -301,9 +301,9 @@ class Baker {
     return std::move(found->times);
   }
 
-  /// Vertices that move with one node or joint. The corners of their box stand for them, because the distance
+  /// Vertices that move with one node or joint. The corners of their box represent them, because the distance
   /// between two affine images is largest at a corner. A blend of joints is nowhere further from its chord
-  /// than one of them. Where weights of morph targets change, every vertex stands for itself.
+  /// than one of them. If weights of morph targets change, every vertex represents itself.
   struct Rigid {
     const Part* part;
     Index joint;                  // in the part's skin; none: the part's node
@@ -353,8 +353,8 @@ class Baker {
     }
   }
 
-  /// Returns positions in bind space for skinned parts, in scene space under the file's own pose for the
-  /// rest.
+  /// Returns positions in bind space for skinned parts, and in scene space under the file's own pose for all
+  /// others.
   std::vector<double> rest_positions() const {
     Pose own(document_, nullptr);
     own.evaluate(0);

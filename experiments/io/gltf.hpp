@@ -17,8 +17,8 @@ inline constexpr double gltf_tolerance = 1e-3;
 /// nodes if there is no scene), as one mesh. Points and lines are skipped, and so are vertices that no
 /// triangle uses; a scene with points and without triangles is a cloud of points. Seams are welded
 /// (`welded_vertices` counts): vertices of equal rest position (bind space if skinned, else scene space)
-/// whose baked positions are equal at all keyframes become one. Notes say what is skipped: points and lines
-/// beside triangles, instances, channels that do not move nodes, unknown extensions.
+/// whose baked positions are equal at all keyframes become one. Notes report what is skipped: points and
+/// lines next to triangles, instances, channels that do not move nodes, unknown extensions.
 ///
 /// Motion: node translation, rotation, scale, morph weights and skins, with LINEAR, STEP and CUBICSPLINE
 /// samplers, evaluated at the union of the key times of all samplers that the clip uses. Between keyframes

@@ -116,7 +116,7 @@ std::string read_uri(const std::filesystem::path& file, const std::string& place
   std::error_code error;
   const std::filesystem::path target = file.parent_path() / relative;
   if (!std::filesystem::is_regular_file(target, error)) {
-    fail(file, place, printable(uri) + ": no such file beside the glTF file");
+    fail(file, place, printable(uri) + ": no such file next to the glTF file");
   }
   return read_file(target);
 }

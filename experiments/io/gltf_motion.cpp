@@ -25,7 +25,7 @@ void slerp(const double* a, const double* b, double u, double* out) {
   cosine *= sign;
   double left = 1 - u, right = u;
   if (cosine <
-      1 - 1e-12) {  // closer than that the quotient of sines loses its digits, and the chord equals the arc
+      1 - 1e-12) {  // when closer, the quotient of sines loses its digits, and the chord equals the arc
     const double angle = std::acos(cosine), sine = std::sin(angle);
     left = std::sin((1 - u) * angle) / sine;
     right = std::sin(u * angle) / sine;

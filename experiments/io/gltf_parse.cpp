@@ -173,7 +173,8 @@ class Parser {
       const std::string name = v.text();
       if (!harmless(name)) v.reject("the extension " + printable(name) + " is required, but not supported");
     }
-    // Compressed geometry is refused where it has no uncompressed copy; the others have notes of their own.
+    // Compressed geometry is refused if it has no uncompressed copy; the other extensions have notes of their
+    // own.
     const std::array<std::string_view, 5> handled{"KHR_draco_mesh_compression", "EXT_meshopt_compression",
                                                   "KHR_meshopt_compression", "EXT_mesh_gpu_instancing",
                                                   "KHR_animation_pointer"};

@@ -15,8 +15,8 @@
 namespace kbvh::io {
 namespace {
 
-/// Tests for statements whose arguments are numbers. Only these go on in the next line after a backslash: a
-/// name may end in one.
+/// Tests for statements whose arguments are numbers. Only these continue in the next line after a backslash:
+/// a name may end in one.
 bool has_numbers(std::string_view word) {
   static const std::set<std::string_view> words{"v",     "vt",   "vn",   "vp",   "p",    "l",    "f",
                                                 "fo",    "curv", "surf", "parm", "trim", "hole", "scrv",
@@ -24,7 +24,7 @@ bool has_numbers(std::string_view word) {
   return words.contains(word);
 }
 
-/// Tests for statements that say nothing about the shape of polygons, or belong to curves.
+/// Tests for statements that do not affect the shape of polygons, or belong to curves.
 bool may_be_skipped(std::string_view word) {
   static const std::set<std::string_view> words{
       "vt",       "vn",       "vp",     "g",     "s",          "o",         "mg",  "usemtl",
@@ -65,8 +65,8 @@ class ObjReader {
     return line;
   }
 
-  /// Removes the backslash with which a line says that it goes on in the next one, and returns whether there
-  /// was one. Comments do not go on.
+  /// Removes the backslash that continues a line in the next one, and returns whether there was one. Comments
+  /// do not continue.
   static bool take_backslash(std::string_view& line) {
     const std::size_t last = line.find_last_not_of(" \t\v\f");
     if (last == std::string_view::npos || line[last] != '\\' || line.find('#') != std::string_view::npos)
@@ -75,7 +75,7 @@ class ObjReader {
     return true;
   }
 
-  /// Cuts off the next statement, without its comment: a line, and the lines in which its numbers go on.
+  /// Cuts off the next statement, without its comment: a line, and the lines in which its numbers continue.
   std::string_view next_statement(std::string_view& rest) {
     const std::string_view first = cut_line(rest);
     std::string_view line = first, words = first;
@@ -122,8 +122,8 @@ class ObjReader {
     }
   }
 
-  /// Skips a statement of a vendor. What does not begin with a word of letters is no statement: a damaged
-  /// line, or another kind of file.
+  /// Skips a vendor's statement. A line that does not begin with a word of letters is no statement: it is
+  /// damaged, or the file is of another kind.
   void skip_unknown(std::string_view word) {
     const auto is_control = [](char c) { return static_cast<unsigned char>(c) < 32 || c == 127; };
     const auto is_letter = [](char c) {

@@ -8,14 +8,13 @@ namespace kbvh::io {
 /// Reads a Wavefront OBJ file: its vertices in file order, every `f` as one primitive with all its vertices
 /// (polygons are not cut into triangles), one keyframe at time 0. A file with B-spline or NURBS surfaces
 /// (obj_surfaces.hpp) and no face gives their control nets; a file with neither gives a cloud of points:
-/// those of its `p` statements, or else all vertices. Indices may be negative (relative) or point forward.
-/// Lines end in '\n', "\r\n" or '\r'. A backslash at the end of a line lets the numbers of a statement go on
-/// in the next one; comments and names end with their line.
+/// those of its `p` statements, or else all vertices. Indices may be negative (relative) or refer to later
+/// vertices. Lines end in '\n', "\r\n" or '\r'. A backslash at the end of a line continues the numbers of a
+/// statement in the next line; comments and names end with their line.
 ///
 /// Texture coordinates, normals, groups, materials and vertex colours are skipped. A note counts skipped
-/// points, polylines (`l`), curves and lines that begin with an unknown word. Refused: a line that begins
-/// with anything but a word, a vertex with 5 or more than 7 numbers, a statement that another file be
-/// included.
+/// points, polylines (`l`), curves and lines that begin with an unknown word. Refused: a line that does not
+/// begin with a word, a vertex with 5 or more than 7 numbers, a statement that includes another file.
 ///
 /// kbvh does not use tinyobjloader: version 2.0rc10 reads "nan", a missing or a misspelt coordinate as 0
 /// without a warning, drops faces of two vertices, wraps large indices, and rounds two thirds of 17-digit

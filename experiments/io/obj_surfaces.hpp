@@ -17,7 +17,7 @@ class ObjSurfaces {
   explicit ObjSurfaces(const std::filesystem::path& file) : file_(file) {}
 
   /// Processes a statement if it is one of these; `words` follow `word`. Throws InputError. Returns whether
-  /// it was one.
+  /// it was one of these.
   bool take(std::string_view word, std::string_view words, std::size_t line, std::uint32_t vertices_so_far);
   /// Records that the vertex (by id) has a weight that is not positive.
   void bad_weight(std::uint32_t vertex) { not_positive_.insert(vertex); }

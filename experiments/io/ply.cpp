@@ -241,9 +241,9 @@ class PlyReader {
 
   // ---- numbers
 
-  /// In text an element begins on a line of its own. It may go on in the next lines, but nothing may follow
-  /// it on its last one: then a value is missing or too many somewhere, and all the following ones would
-  /// shift.
+  /// In text an element begins on a line of its own. It may continue in the next lines, but nothing may
+  /// follow it on its last line: that would mean a missing or an extra value somewhere, and all following
+  /// values would shift.
   void begin_row(const Element& element, std::uint64_t i) {
     if (row_.last_line > 0) before_ = row_;
     row_ = {&element, i, 0, 0};

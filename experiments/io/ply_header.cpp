@@ -33,7 +33,8 @@ class HeaderReader {
     bool has_format = false;
     if (bytes_.starts_with("\xEF\xBB\xBFply")) at_ = 3;  // a byte order mark
     if (at_ == 0 && !bytes_.starts_with("ply")) refuse_utf16(bytes_, file_.string());
-    // The first line decides the line ends. The byte after the last header line may be any: it is data.
+    // The first line decides the line ends. The byte after the last header line may have any value: it is
+    // data.
     const std::size_t first = bytes_.find_first_of("\r\n");
     if (first != std::string_view::npos && first + 1 < bytes_.size() && bytes_[first] == '\r' &&
         bytes_[first + 1] != '\n')

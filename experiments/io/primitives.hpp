@@ -13,8 +13,8 @@ enum class TakeAs : std::uint8_t {
   points,     ///< every vertex one primitive, in any mesh
 };
 
-/// Converts the primitives. Throws InputError that names the mesh if points or control nets are to be
-/// triangles.
+/// Converts the primitives. Throws InputError that names the mesh if points or control nets would have to
+/// become triangles.
 void take_as(AnimatedMesh& mesh, TakeAs how);
 
 /// Makes every vertex of the mesh a primitive.

@@ -7,10 +7,10 @@
 namespace kbvh::io {
 
 /// Lets primitives share vertices at seams, where a file stores a vertex once per normal or texture
-/// coordinate: vertices with equal positions at all keyframes, and equal `rest` positions ([vertex][3];
-/// empty: the file has none besides its keyframes), are one vertex, and every primitive uses the first of
-/// them that any primitive uses. Without it, two triangles at a seam would not be recognised as neighbours.
-/// No vertex is removed or renumbered. Returns the number of vertices that no primitive uses any more.
+/// coordinate. Vertices with equal positions at all keyframes, and equal `rest` positions ([vertex][3];
+/// empty: the file has none besides its keyframes), count as one vertex, and every primitive uses the first
+/// of them that any primitive uses. Otherwise two triangles at a seam would not be recognised as neighbours.
+/// No vertex is removed or renumbered. Returns the number of vertices that no primitive uses any longer.
 /// Expected O(keyframes * vertices).
 std::size_t weld(AnimatedMesh& mesh, const std::vector<double>& rest);
 

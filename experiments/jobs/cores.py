@@ -1,4 +1,4 @@
-"""Cores for timed jobs: each job holds its cores alone, also beside the jobs of other studies on this machine.
+"""Cores for timed jobs: each job has its cores to itself, also among the jobs of other studies on this machine.
 
 A core is held by a lock on a file, which the system releases when the last process that holds it ends, however it ends.
 """

@@ -40,7 +40,7 @@ def is_time(text: Any) -> bool:
 
 def rank(record: dict[str, Any]) -> tuple[bool, str]:
     """Orders the records of one key: the largest counts, the newest finished one; those without a valid time are the oldest. Of
-    equal ones, the one that stands later. This is the rule of `kbvh merge` (experiments/results/merge.cpp), and a test compares
+    equal ones, the later one in the file. This is the rule of `kbvh merge` (experiments/results/merge.cpp), and a test compares
     the two."""
     when = record.get("when")
     return record.get("unfinished") is not True, when if isinstance(when, str) and is_time(when) else ""

@@ -29,7 +29,7 @@ def now() -> str:
 
 
 def die_with_parent(number: int) -> Callable[[], None]:
-    """Returns what a process does first that must not outlive its parent: a killed worker leaves no program behind that
+    """Returns the first step of a process that must not outlive its parent: a killed worker leaves no program behind that
     occupies a core, and a killed Snakemake no worker."""
     libc = ctypes.CDLL(None)
     set_parent_death_signal = 1

@@ -1,6 +1,6 @@
 // Micro-benchmarks of kernels, builders, exact tests, queue operations and events: ns each. Google Benchmark
-// runs them; two commits are compared by its tools (compare.py benchmarks old.json new.json). Clips are
-// measured by `kbvh run` only.
+// runs them; its tools compare two commits (compare.py benchmarks old.json new.json). Only `kbvh run`
+// measures clips.
 #include <benchmark/benchmark.h>
 
 #include <cmath>
@@ -51,7 +51,7 @@ Scene<float> sheets(std::uint32_t n, std::uint32_t keyframes) {
   return scene;
 }
 
-/// Says how long one of `count` items in each iteration takes.
+/// Reports how long one of `count` items in each iteration takes.
 void report_each(benchmark::State& state, double count, const char* what) {
   state.counters[std::string("s_per_") + what] =
       benchmark::Counter(count, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
@@ -167,7 +167,7 @@ void queue(benchmark::State& state) {
   report_each(state, 2.0 * slots, "operation");
 }
 
-/// A kinetic tree over one clip, its beginning left out.
+/// A kinetic tree over one clip, without the clip's beginning.
 void events(benchmark::State& state, const char* id) {
   const Scene<float> scene = sheets(40, 9);
   const StrategyEntry* entry = nullptr;

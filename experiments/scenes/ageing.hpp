@@ -10,7 +10,7 @@
 /// seconds; z points up. Requests above 2^27 triangles throw io::InputError.
 namespace kbvh::scenes {
 
-/// The parameters that the bodies have in common.
+/// The common parameters of these bodies.
 struct AgeingConfig {
   std::uint32_t triangles = 2000;  ///< the nearest number that the pattern allows is made
   std::uint64_t seed = 1;

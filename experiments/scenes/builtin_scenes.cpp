@@ -59,7 +59,7 @@ Meshes tablecloth(const BuiltinOptions& options, const MakeProgress& progress) {
 }
 
 // The hand holds a corner of the tablecloth and pulls it over the table, while the cloth falls. Ten frames
-// per keyframe, as many as cloth needs to be the easy case of other scenes; plans change at every frame.
+// per keyframe, as many as make cloth the easy case in other scenes; plans change at every frame.
 DragRule dragged_corner(const BuiltinOptions& options, const Meshes& meshes) {
   constexpr std::uint32_t frames_per_keyframe = 10;
   DragRule rule;

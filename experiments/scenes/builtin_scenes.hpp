@@ -44,7 +44,7 @@ struct DragRule {
   std::uint32_t frames = 0;
 };
 
-/// The bodies that a scene's pairs are between.
+/// Which bodies form a scene's pairs.
 enum class BodiesOf : std::uint8_t {
   several,  ///< pairs between bodies
   one,      ///< the scene has one body: pairs within it; the option `obstacle` is refused
@@ -58,7 +58,7 @@ struct BuiltinScene {
   /// For scenes whose plans change at run time: they are played at the rule's frames. Else nullptr.
   ReversalRule (*reversal)(const BuiltinOptions& options) = nullptr;
   BodiesOf bodies = BodiesOf::several;
-  /// The same for scenes with a dragged part, as a function of the generated bodies.
+  /// Does the same for scenes with a dragged part, as a function of the generated bodies.
   DragRule (*drag)(const BuiltinOptions& options, const std::vector<io::AnimatedMesh>& meshes) = nullptr;
 
   /// Returns whether the scene makes its own changes of plans, and defines its frames.

@@ -11,7 +11,7 @@ namespace kbvh::scenes::cloth {
 
 bool LayerContacts::stale(const std::vector<Vec>& x) const {
   if (listed_at_.size() != x.size()) return true;
-  // The list holds all pairs that can be in contact while no vertex has moved by more than half of its
+  // The list holds all pairs that can be in contact until a vertex has moved by more than half of the list's
   // margin.
   const double slack = 0.25 * distance_;
   for (std::size_t p = 0; p < x.size(); ++p) {

@@ -64,8 +64,8 @@ inline double dragged_speed(double across, double air_drag, double dt) {
   return (1.0 - kept) * across;
 }
 
-/// Applies Coulomb friction after a vertex was pushed out of a solid along n by `push`: removes from its
-/// displacement `slide` relative to the solid the part that friction holds.
+/// Applies Coulomb friction after a vertex was pushed out of a solid along n by `push`: removes the part of
+/// its displacement `slide`, relative to the solid, that friction holds.
 inline void resist_sliding(Vec& x, Vec slide, const Vec& n, double push, double friction) {
   slide -= n * dot(slide, n);
   const double amount = length(slide);
@@ -160,9 +160,9 @@ class ConfigHash {
 /// Throws io::InputError "scene: what is ..., must be from ... to ..." unless lowest <= value <= highest.
 void check_range(const char* scene, double value, double lowest, double highest, const char* what);
 
-/// Checks the parameters that every cloth has, by these names in its config: density, stiffness, drag,
-/// viscosity, friction and distance of layers. `check(value, lowest, highest, what)` is a `check_range` for
-/// the scene.
+/// Checks the parameters that all cloths have in common, by these names in their config: density, stiffness,
+/// drag, viscosity, friction and distance of layers. `check(value, lowest, highest, what)` is a `check_range`
+/// for the scene.
 template <class Config, class Check>
 void check_cloth(const Config& c, const Check& check) {
   check(c.area_density, 1e-3, 1e3, "the area density");

@@ -92,7 +92,7 @@ class BurstingBall {
     const Vec centre{side_ * ball_radius, side_ * 0.06, ball_height};
     for (std::size_t i = 0; i < fragments_.size(); ++i) {
       Fragment& f = fragments_[i];
-      // Outwards, and at random: fragments push each other in all directions. Some of the motion stays.
+      // Outwards, and at random: fragments push each other in all directions. Part of the motion stays.
       const Vec outwards = (f.centre - centre) * (1 / ball_radius);
       f.velocity = f.velocity * (0.35 + 0.25 * draw(i, 11)) + outwards * (1.4 + 1.0 * draw(i, 4)) +
                    direction(noise_, numbers * i + 5) * (1.3 * (1 + draw(i, 8)));

@@ -36,7 +36,8 @@ struct GarmentConfig {
   double friction = 0.4;              ///< Coulomb's coefficient, cloth on figure and cloth on itself
   double layer_distance = 0.6;        ///< kept between layers, in mean grid squares; 0: it may cut itself
 
-  /// The drawn figure lies 1 mm below the solid that stops the cloth, but in patches above it by up to this.
+  /// The drawn figure lies 1 mm below the solid that stops the cloth; in patches it rises above it by up to
+  /// this.
   double skin_bite = 0.002;
 
   /// Solver steps per keyframe of the full simulation; 0: from grid and keyframe spacing, so that threads

@@ -140,7 +140,7 @@ class Sewing {
   }
 
   /// Returns the position of a column across the front or back, from 0 to 1. Columns under the shoulders have
-  /// a fixed share of the width for any number of columns, so that patterns of all counts have one cut.
+  /// a fixed share of the width for any number of columns, so that patterns of all counts have the same cut.
   double across(double column) const {
     const double m = c_.shoulder, n = c_.columns;
     if (column <= m) return shoulder_share * column / m;

@@ -139,7 +139,7 @@ void GarmentSolver::step(WalkingFigure& figure, double t, double dt, std::uint32
     solve_bending(dt);
     solve_threads(dt);
   }
-  // Vertices that are near each other in the pattern are held by threads and bending.
+  // Threads and bending hold vertices that are near each other in the pattern.
   const double near = 1.6 * layer_distance_;
   layers_.solve(x_, previous_, config_.friction, [&](std::uint32_t p, std::uint32_t q) {
     const Vec d = pattern_.rest[q] - pattern_.rest[p];

@@ -9,7 +9,7 @@
 /// points up. Requests above 2^27 triangles throw io::InputError.
 namespace kbvh::scenes {
 
-/// The parameters that these bodies have in common.
+/// The common parameters of these bodies.
 struct ModalConfig {
   std::uint32_t triangles = 2000;  ///< the nearest number that the pattern allows is made
   std::uint64_t seed = 1;

@@ -42,7 +42,7 @@ NurbsSurface nurbs_surface(const NurbsConfig& config) {
   mesh.name = "nurbs-" + std::to_string(mesh.primitive_count());
   mesh.keyframe_times = keyframe_times(config.keyframes, config.keyframes_per_second);
   mesh.positions.reserve(std::size_t{3} * mesh.vertex_count * config.keyframes);
-  // A control point lies at the mean of its knots (Greville), so that the surface without its waves would be
+  // A control point lies at the mean of its knots (Greville), so that without its waves the surface would be
   // the square itself, with each knot at its place.
   std::vector<double> along(row);
   for (std::uint32_t i = 0; i < row; ++i) {

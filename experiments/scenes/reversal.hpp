@@ -17,8 +17,8 @@ template <class S>
 PlanScript<S> record_reversals(const Scene<S>& scene, const ReversalRule& rule,
                                const MakeProgress& progress = {});
 
-/// Returns the same script from `folder`, if it was recorded before, or records it now and keeps it there; an
-/// empty folder keeps nothing. Damaged files and those of other versions are recorded anew.
+/// Returns the same script from `folder` if it was recorded before, or records it now and stores it there;
+/// with an empty folder nothing is stored. Damaged files and those of other versions are recorded again.
 template <class S>
 PlanScript<S> recorded_reversals(const Scene<S>& scene, const ReversalRule& rule,
                                  const std::filesystem::path& folder, const MakeProgress& progress = {});

@@ -42,8 +42,8 @@ std::uint64_t card_hash(const LoadedScene& scene);
 std::string folder_name(const LoadedScene& scene);
 
 /// Writes a scene for inspection and pictures: every body as OBJ, with PC2 if it moves, its number before its
-/// name, and the cards as card.json, with the hash. `most_keyframes`: of long clips only this many, the
-/// first, the last and some between; 0: all. Throws io::InputError.
+/// name, and the cards as card.json, with the hash. `most_keyframes` limits the keyframes of long clips to
+/// this many: the first, the last and some between; 0: all. Throws io::InputError.
 void export_scene(const LoadedScene& scene, const std::filesystem::path& folder, std::size_t most_keyframes);
 
 }  // namespace kbvh::experiments

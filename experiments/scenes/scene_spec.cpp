@@ -140,7 +140,7 @@ json located(json scene, const fs::path& folder) {
   return scene;
 }
 
-/// Rejects a word that is neither a file nor the beginning of a file name: it was meant as a shape.
+/// Rejects a word that is neither a file nor the beginning of a file name: it was probably meant as a shape.
 void check_is_a_file(const BodySpec& body) {
   std::error_code error;
   const std::string word = body.file.filename().string();
@@ -193,7 +193,7 @@ json body_from_text(const std::string& text) {
   auto parts = split(text, ',');
   const std::size_t colon = parts[0].find(':');
   const std::string head = parts[0].substr(0, colon);
-  // "name:key=value" is a shape, even if there is no shape of that name.
+  // "name:key=value" means a shape, even if there is no shape of that name.
   const bool means_a_shape = colon != std::string::npos && head.find_first_of("./\\") == std::string::npos &&
                              head != "data" && parse_assignment(parts[0].substr(colon + 1));
   if (is_shape(head) || means_a_shape) {
@@ -318,7 +318,8 @@ std::string missing_file(const SceneSpec& spec) {
 }
 
 namespace {
-/// Says which polygons of more than three corners are unusual at the first keyframe, by which they are cut.
+/// Reports which polygons of more than three corners are unusual at the first keyframe, by which they are
+/// cut.
 void add_notes_on_polygons(const io::AnimatedMesh& mesh, const std::string& source,
                            std::vector<std::string>& notes) {
   if (mesh.kind != io::MeshKind::polygons) return;

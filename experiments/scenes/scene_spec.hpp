@@ -88,7 +88,7 @@ struct LoadedScene {
   SceneOrigin origin = SceneOrigin::shapes;
   VertexOrder order = VertexOrder::given;  ///< `renumbered` is done by `assemble`
   std::optional<ReversalRule> reversal;    ///< of scenes that record their plan changes
-  std::optional<DragRule> drag;            ///< of scenes of which a hand drags a part
+  std::optional<DragRule> drag;            ///< of scenes in which a hand drags a part
   std::optional<ScriptSpec> script;        ///< user-defined plan changes
   std::vector<std::string> notes;          ///< notes of the readers, one sentence each
 };

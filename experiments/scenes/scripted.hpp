@@ -31,8 +31,8 @@ struct ScriptSpec {
 
 /// Reads a script: an object with `steps` (and, both or none, `frames` and `rate`), or the list of steps
 /// alone, or a text, the name of a file with either one, relative to `folder`. Throws io::InputError that
-/// begins with `place` or the file's name: on unknown keys, numbers that are not finite, times that do not
-/// ascend.
+/// begins with `place` or the file's name: for unknown keys, numbers that are not finite, and times that do
+/// not ascend.
 ScriptSpec read_script_spec(const nlohmann::json& value, const std::string& place,
                             const std::filesystem::path& folder);
 

@@ -56,7 +56,7 @@ class Tube {
     }
   }
 
-  /// Appends a keyframe with the present centres and normals.
+  /// Appends a keyframe with the current centres and normals.
   void append() {
     positions_.clear();
     for (std::uint32_t i = 0; i < rings_; ++i) {
@@ -97,7 +97,7 @@ Tube tube(const std::string& shape, std::uint32_t triangles, double length, doub
   return {shape, rings, sides, radius};
 }
 
-/// A curve of dense points, which is asked by its length.
+/// A curve of dense points, parametrised by its length.
 class Curve {
  public:
   void clear() { points_.clear(); }
@@ -168,7 +168,7 @@ io::AnimatedMesh twisted_rod(const AgeingConfig& config) {
     }
     curve.round_off(std::size_t(1.2 * radius / rod * samples));
     curve.measure();
-    // What rounding off takes away is missing at both ends alike.
+    // Compensates equally at both ends for the length that rounding off removes.
     for (std::uint32_t i = 0; i < made.rings(); ++i)
       made.centres[i] = curve.at(0.5 * (curve.size() - rod) + rod * double(i) / double(made.rings() - 1));
     // Twist becomes writhe: turns of the helix are taken from those of the rod.

@@ -344,7 +344,7 @@ StressScene changes_at_keyframes(const FamilySetting& setting) {
   const auto& times = scene.bodies[0].times;
   for (std::size_t k = 0; k < times.size(); ++k)
     scene.steps.push_back(changes_at(random, scene, times[k], 1 + random.below(30)));
-  // No strategy can know in advance that a body with one keyframe will move.
+  // A strategy cannot know in advance that a body with one keyframe will move.
   if (random.one_in(3)) {
     StressBody& still = scene.bodies[1];
     still.times.resize(1);

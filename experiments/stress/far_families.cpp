@@ -1,11 +1,11 @@
-// Gaps among numbers far beyond their size: what is relative to the largest coordinate of a body closes them.
+// Gaps among numbers far beyond their size: any error relative to a body's largest coordinate closes them.
 
 #include "experiments/stress/family_parts.hpp"
 
 namespace kbvh::experiments::stress {
 namespace {
 
-/// Two sheets, one over the other, with a gap between them; flat, or alike waves; the lower one moves.
+/// Two sheets, one over the other, with a gap between them; flat, or in equal waves; the lower one moves.
 StressScene sheets_with_a_gap(Random& random, const FamilySetting& setting, double gap) {
   StressScene scene;
   const double wave = random.among({0.0, 0.4 * gap, 0.4}), shear = 0.05 * random.unit();
@@ -43,7 +43,7 @@ StressScene far_vertices(const FamilySetting& setting) {
   StressScene scene = sheets_with_a_gap(random, setting, gap);
   StressBody& body = scene.bodies[0];
   if (random.one_in(2)) {
-    // A ground below the sheet, of the same body.
+    // A ground below the sheet, as part of the same body.
     const double ground[9] = {-far, -far, -1, far, -far, -1, 0, far, -1};
     std::vector<double> positions;
     for (std::size_t k = 0; k < body.times.size(); ++k) {

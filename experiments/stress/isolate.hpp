@@ -20,8 +20,8 @@ struct JobOutcome {
 /// Runs jobs 0, 1, ... in child processes, so that no job can end this process: work(i) is called in a copy
 /// of this process, and its text is returned. One child runs jobs until it ends; after a crash or a hang the
 /// next child continues with the following job. A job may take `seconds` of processor time, and many times
-/// that of wall-clock time. Its output on standard error is dropped if `silent`. For processes of one thread.
-/// Throws std::runtime_error if no child can be created.
+/// that of wall-clock time. Its output on standard error is dropped if `silent`. For processes with one
+/// thread. Throws std::runtime_error if no child can be created.
 enum class Stderr : unsigned char { shown, silent };
 std::vector<JobOutcome> run_in_children(std::size_t jobs, double seconds,
                                         const std::function<std::string(std::size_t)>& work,

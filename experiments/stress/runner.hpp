@@ -35,7 +35,7 @@ struct CaseResult {
   bool audited = false;
   double seconds = 0;  ///< processor time; 0 if it did not finish
 
-  /// Returns whether the outcome is a failure: held, unsuitable and refused are none.
+  /// Returns whether the outcome is a failure; held, unsuitable and refused are not.
   bool failed() const;
 };
 
@@ -85,7 +85,7 @@ struct StressFailure {
 struct StressOptions {
   std::vector<const Family*> families;
   std::vector<ContestantSpec> contestants;
-  std::uint64_t scenes = 100;  ///< in turn of the families
+  std::uint64_t scenes = 100;  ///< from the families in turn
   std::uint64_t seed = 1;
   std::vector<std::string> scalars{"float", "double"};
   std::vector<std::uint32_t> l{1, 7, 100};

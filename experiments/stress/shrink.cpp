@@ -37,7 +37,7 @@ class Shrinker {
     return tries_ >= budget_.tries ||
            std::chrono::duration<double>(Clock::now() - begin_).count() > budget_.seconds;
   }
-  /// Takes the candidate if it fails, too.
+  /// Accepts the candidate if it fails, too.
   bool attempt(StressScene candidate) {
     if (spent()) return false;
     ++tries_;

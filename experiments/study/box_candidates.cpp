@@ -15,7 +15,7 @@ namespace kbvh::experiments {
 
 namespace {
 
-/// Features of one kind as primitives of a body. With a margin every vertex is two: its lowest and its
+/// Features of one kind as primitives of a body. With a margin every vertex becomes two: its lowest and its
 /// highest corner.
 class Features {
  public:

@@ -11,8 +11,8 @@
 namespace kbvh::experiments {
 
 /// One clip played once by one contestant. It begins when the session has restored scene and instance: the
-/// positions that the strategy asks for, its `reset`, its answer and its response to changes are frame 0.
-/// Questions about intervals count the first interval as frame 0.
+/// positions that the strategy needs, its `reset`, its answer and its response to changes are frame 0. In
+/// queries of intervals, the first interval is frame 0.
 struct ClipTimes {
   PhaseTimes start;                    ///< positions and `reset`, which are also part of the first frame
   std::vector<PhaseTimes> frames;      ///< seconds
@@ -38,8 +38,8 @@ class WarmUp {
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
 };
 
-/// Plays frames: exactly the calls that are timed. `ask(times, f)` asks the question of frame f and returns
-/// the size of its answer. With `warm_up`, ends after the frame in which that is over.
+/// Plays frames: exactly the calls that are timed. `ask(times, f)` makes the query of frame f and returns the
+/// size of its answer. With `warm_up`, ends after the frame in which the warm-up is over.
 template <class S, class Ask>
 ClipTimes play_frames(Session<S>& session, std::span<const double> frames, const PlanScript<S>* script,
                       const Ask& ask, const WarmUp* warm_up = nullptr) {
@@ -88,7 +88,7 @@ ClipTimes play_intervals(Session<S>& session, std::span<const double> knots, con
   return clip;
 }
 
-/// Returns the first frame of a timed clip that does not answer like its replay, in words; "" if all do.
+/// Returns in words the first frame of a timed clip whose answer differs from the replay's; "" if none does.
 std::string answers_differ(std::span<const std::uint64_t> timed, std::span<const std::uint64_t> replayed);
 
 }  // namespace kbvh::experiments

@@ -13,7 +13,7 @@ template <class S>
 std::vector<double> contact_times(const Scene<S>& scene, std::vector<double> frames,
                                   const PlanScript<S>& script);
 
-/// A contestant, with what its record says of impacts.
+/// A contestant, with its record's data about impacts.
 template <class S>
 struct ContactEntrant : Entrant<S> {
   ImpactStats impacts;
@@ -23,8 +23,8 @@ struct ContactEntrant : Entrant<S> {
 template <class S>
 class ContactMeasurement : public Entrants<ContactEntrant<S>> {
  public:
-  /// Finds the true contacts by sort-and-sweep. The script changes plans at some of the knots, and nothing
-  /// else; null: no script. Throws io::InputError unless all bodies in pairs consist of triangles.
+  /// Finds the true contacts by sort-and-sweep. The script may only change plans, at some of the knots; null:
+  /// no script. Throws io::InputError unless all bodies in pairs consist of triangles.
   ContactMeasurement(const Scene<S>& scene, std::vector<double> knots, const PlanScript<S>* script);
 
   /// Replays a contestant, comparing every n-th interval and the last with the truth.

@@ -19,7 +19,7 @@ bool has_parameter(const Info& info, const std::string& key) {
 
 constexpr std::string_view family_prefix = "family:";
 
-/// Returns whether the word is the id of one strategy, and not a word for several.
+/// Returns whether the word is the id of a single strategy, and not a word for several.
 bool is_id(const std::string& id) {
   return id != "all" && id != "default" && !id.starts_with(family_prefix);
 }
@@ -107,7 +107,7 @@ std::string label_of(const ContestantSpec& spec) {
                     (known.empty() ? "none" : joined(known)) + suggestion(key, known));
 }
 
-/// Rejects a common parameter that no strategy of the list has.
+/// Rejects a common parameter that no strategy in the list has.
 [[noreturn]] void refuse_common_parameter(const std::vector<ContestantSpec>& list, const std::string& name) {
   const bool qualified = name.find('.') != std::string::npos;
   std::vector<std::string> known;

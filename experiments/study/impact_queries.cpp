@@ -48,7 +48,7 @@ bool is_integer(const std::string& text) {
 /// Returns a quotient that is exactly a double; nothing otherwise.
 std::optional<double> exact_quotient(const std::string& top, const std::string& bottom) {
   if (!is_integer(top) || !is_integer(bottom)) return {};
-  // A number that begins with a zero would be read as octal.
+  // A number with a leading zero would be read as octal.
   const auto decimal = [](const std::string& text) {
     const bool negative = text.starts_with('-');
     const std::size_t first = std::min(text.find_first_not_of('0', negative ? 1 : 0), text.size() - 1);

@@ -27,7 +27,7 @@ const PrimitivePair* lacking(const PairBuffer& from, const PairBuffer& without) 
   return nullptr;
 }
 
-/// Compares an answer of the replay with the truth, both sorted; returns what is wrong, or "".
+/// Compares an answer of the replay with the truth, both sorted; returns the first difference, or "".
 std::string compared(const PairBuffer& found, const PairBuffer& truth, bool all_found_are_true) {
   if (const PrimitivePair* missed = lacking(truth, found)) return "pair " + text(*missed) + " is missed";
   if (!all_found_are_true) return {};

@@ -21,7 +21,7 @@ struct Measured {
   Verification verification;
   ChangesVerification changes;  ///< of answers as changes
   std::uint64_t sampled_every = 1;
-  /// Of the replay: the calls that are timed and no others.
+  /// From the replay, which makes the timed calls and no others.
   Counters counters;
   std::vector<std::uint64_t> answers;  ///< of the replay: the size of each frame's answer
   std::string refused;                 ///< the reason for a missing time, or empty
@@ -29,14 +29,14 @@ struct Measured {
   double build_seconds = 0;            ///< the preparation: topologies, and creating the instance
   std::string choice;                  ///< of a strategy that chooses, at the end of the clip
   std::vector<ClipTimes> repetitions;
-  std::optional<std::size_t> steady_from;  ///< the first frame that the beginning has no part in
+  std::optional<std::size_t> steady_from;  ///< the first frame unaffected by the beginning
 };
 
-/// Refuses a contestant its time because of an exception: a broken guarantee, or, if memory ran out, no
-/// verdict; the next run measures it again.
+/// Refuses a contestant its time because of an exception. Records a broken guarantee or, if memory ran out,
+/// no verdict; the next run then measures it again.
 void refuse(Measured& measured, const std::exception& thrown);
 
-/// What a contestant is refused its time for, besides exceptions of its own.
+/// The reasons to refuse a contestant its time, besides its own exceptions.
 struct BrokenPromise : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -56,7 +56,7 @@ struct Entrant {
   }
 
   /// Runs `work`. Refuses the contestant if `work` throws, except for ConfigError, which is passed on.
-  /// Returns whether it ran to its end.
+  /// Returns whether it ran to completion.
   template <class Work>
   bool attempt(const Work& work) {
     try {
@@ -72,7 +72,7 @@ struct Entrant {
   }
 };
 
-/// The contestants of a measurement by their places, as run/ and results/ see them in every kind of
+/// The contestants of a measurement by their places, in the form that run/ and results/ use for every kind of
 /// measurement. A kind adds `add` (verifies and replays a contestant), `play` (warms it up, plays the clip
 /// once, compares the sizes of its answers with the replay's, and keeps the times; a contestant that throws
 /// or differs is refused its times and no longer `timed`) and `extras` (members of its record).
@@ -81,7 +81,7 @@ class Entrants {
  public:
   std::size_t size() const { return entrants_.size(); }
   Measured& operator[](std::size_t i) { return entrants_[i].measured; }
-  /// Adds a contestant that is refused its time without being played; the caller says why.
+  /// Adds a contestant that is refused its time without being played; the caller adds the reason.
   Measured& add_refused(const ContestantSpec& spec) {
     Measured& measured = entrants_.emplace_back().measured;
     measured.spec = &spec;
@@ -97,7 +97,7 @@ class Entrants {
 /// Receives progress messages; may be empty.
 using MeasureProgress = std::function<void(const std::string&)>;
 
-/// The question of every frame, with room for its answer.
+/// The query of every frame, with space for its answer.
 struct FrameQuery {
   std::optional<Answer> changes{};  ///< the changes of this answer; otherwise the pairs
   PairBuffer pairs{}, ended{};
@@ -125,7 +125,7 @@ template <class S>
 class Measurement : public Entrants<Entrant<S>> {
  public:
   /// The script, if given, is replayed to every contestant; its times must be frames, and the oracle must be
-  /// made for it. With `changes`, frames ask for the changes of this answer instead of the pairs.
+  /// made for it. With `changes`, frames request the changes of this answer instead of the pairs.
   Measurement(const Scene<S>& scene, std::vector<double> frames, Oracle<S>& oracle,
               const PlanScript<S>* script = nullptr, std::optional<Answer> changes = {})
       : scene_(&scene),
@@ -135,11 +135,11 @@ class Measurement : public Entrants<Entrant<S>> {
         query_{changes},
         steady_from_(steady_frame(scene, std::span<const double>(frames_), script != nullptr)) {}
 
-  /// Verifies a contestant over all frames, comparing every n-th with the oracle; its changes, too, if these
-  /// are asked. Then plays exactly the timed calls on a second instance, which counts; compares the answers
-  /// of the same frames with the oracle, and keeps the sizes of all. If the guarantee holds, creates the
-  /// instance that will be timed. Exceptions of the strategy count as a broken guarantee; ConfigError
-  /// is passed on.
+  /// Verifies a contestant over all frames, comparing every n-th with the oracle; also verifies its changes
+  /// if these are requested. Then plays exactly the timed calls on a second instance, which counts; compares
+  /// the answers of the same frames with the oracle, and keeps the sizes of all. If the guarantee holds,
+  /// creates the instance that will be timed. Exceptions of the strategy count as a broken guarantee;
+  /// ConfigError is passed on.
   void add(const ContestantSpec& spec, std::uint64_t oracle_every);
 
   void play(std::size_t i);

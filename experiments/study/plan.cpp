@@ -17,7 +17,7 @@ void add_once(std::vector<T>& list, T value) {
   if (std::find(list.begin(), list.end(), value) == list.end()) list.push_back(std::move(value));
 }
 
-/// Returns the text of a parameter's value, as Params takes it.
+/// Returns the text of a parameter's value in the form that Params takes.
 std::string value_text(const json& value, const std::string& where) {
   if (value.is_string()) return value.get<std::string>();
   if (value.is_number()) return value.dump();
@@ -75,7 +75,7 @@ StrategyRequest read_strategy(const json& value, const std::string& place) {
   return request;
 }
 
-/// Reads whose changes are asked; "none" overrides the level above.
+/// Reads which answer's changes are requested; "none" overrides the level above.
 std::optional<Answer> read_answer(const JsonReader& keys, const std::string& text) {
   if (text == "none") return {};
   for (const Answer answer : {Answer::candidates, Answer::pairs})

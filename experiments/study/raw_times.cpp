@@ -21,7 +21,7 @@ std::vector<Draw> resamples(std::size_t repetitions) {
   return all;
 }
 
-/// Returns the median, and disorders the values; of an even number, the mean of the two middle values.
+/// Returns the median, for an even number of values the mean of the two middle ones. Changes their order.
 double median_of(std::vector<double>& values) {
   const auto half = values.begin() + std::ptrdiff_t(values.size() / 2);
   std::nth_element(values.begin(), half, values.end());

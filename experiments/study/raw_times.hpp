@@ -11,16 +11,16 @@
 
 namespace kbvh::experiments {
 
-/// Fewer repetitions have a range, and no interval.
+/// Fewer repetitions have a range instead of an interval.
 inline constexpr std::size_t fewest_of_an_interval = 5;
 
-/// Which frames count.
+/// The frames that count.
 enum class Part : std::uint8_t {
   clip,    ///< all
-  steady,  ///< from the second knot of the overlaid plans on: nothing of the beginning
+  steady,  ///< from the second knot of the overlaid plans on, without the beginning
 };
 
-/// How repetitions become one time.
+/// How repetitions are combined to one time.
 enum class By : std::uint8_t {
   frames,  ///< the sum over frames of each frame's median: a disturbance of one repetition does not count
   clips,   ///< the median of the clips' sums: for contestants whose work has no fixed frame
@@ -32,7 +32,7 @@ struct RawTimes {
   std::vector<PhaseTimes> clip, steady;              ///< [repetition]: sums over frames, ms
   std::optional<std::size_t> steady_from;            ///< a frame; nothing: there are no steady times
   By by = By::frames;                                ///< how this contestant must be counted
-  /// Of the rounds: repetitions of two contestants with equal texts were played next to each other.
+  /// Identifies the rounds: repetitions of two contestants with equal texts were played next to each other.
   std::string session;
 
   std::size_t repetitions() const { return totals.size(); }
@@ -49,24 +49,24 @@ Draw every_repetition(std::size_t repetitions);
 /// Returns the time of a phase in ms per frame, over the drawn repetitions. Phases: motion, update,
 /// traversal, triangle_tests, plan_changes, geometry_changes, query (traversal + triangle_tests), upkeep
 /// (update and changes), candidates (upkeep + traversal), total (candidates + triangle_tests),
-/// total_with_motion. The total is computed as `by` says, and so is the motion; the phases of the total are
-/// the medians of their sums, scaled to it. Returns 0 for steady times where there are none.
+/// total_with_motion. The total and the motion are computed as `by` requires; the phases of the total are the
+/// medians of their sums, scaled to the total. Returns 0 for steady times if there are none.
 double time_of(const RawTimes& times, std::string_view phase, Part part, By by,
                std::span<const std::uint32_t> draw);
-/// The same over all repetitions.
+/// Does the same over all repetitions.
 double time_of(const RawTimes& times, std::string_view phase, Part part = Part::clip);
 
 /// Returns times of a phase over resampled repetitions, 200 of them; the same resamples on every machine.
 std::vector<double> replicates(const RawTimes& times, std::string_view phase, Part part, By by);
-/// Whether repetitions of two contestants are of the same rounds, and therefore drawn together.
+/// Whether repetitions of two contestants belong to the same rounds, and are therefore drawn together.
 enum class Rounds : std::uint8_t { same, others };
-/// Returns the middle 95 % of the quotients of replicates. Those of other rounds are paired in reversed
-/// order, which makes their draws independent.
+/// Returns the middle 95 % of the quotients of replicates. Replicates of different rounds are paired in
+/// reversed order, which makes their draws independent.
 std::pair<double, double> middle_of_quotients(const std::vector<double>& above,
                                               const std::vector<double>& below, Rounds rounds);
 
-/// How sure a ratio is: an interval of 95 % (percentile bootstrap over whole rounds) or, with fewer than five
-/// repetitions, the range over single repetitions.
+/// The uncertainty of a ratio: an interval of 95 % (percentile bootstrap over whole rounds) or, with fewer
+/// than five repetitions, the range over single repetitions.
 struct Within {
   double low, high;
   bool is_interval;
@@ -88,9 +88,9 @@ struct TimeOf {
 std::optional<RatioOfTimes> ratio_of(const TimeOf& numerator, const TimeOf& denominator,
                                      Part part = Part::clip);
 
-/// Returns the frame from which a contestant has paid for its preparation and its beginning: there and at all
-/// later frames, its preparation (ms) and frames so far, added up, take no longer than the other's. Nothing
-/// if that never comes about. By medians of frames.
+/// Returns the first frame at which a contestant has paid for its preparation and its beginning: from there
+/// on, the sum of its preparation (ms) and its frames so far never exceeds the other's. Nothing if there is
+/// no such frame. Uses medians of frames.
 std::optional<std::size_t> paid_from(const RawTimes& own, double own_preparation, const RawTimes& other,
                                      double other_preparation);
 

@@ -124,8 +124,8 @@ std::vector<Ray<S>> make_rays(const RayStudy& study, const Scene<S>& scene,
     }
     return rays;
   }
-  // The camera stands aside and above, at one and a half diagonals, and its pixels cover the sphere around
-  // the box.
+  // The camera stands to the side and above, at a distance of one and a half diagonals, and its pixels cover
+  // the sphere around the box.
   const double radius = std::hypot(size[0], size[1], size[2]) / 2;
   const Vector back = unit({0.62, -0.71, 0.33});
   const Vector right = unit(cross({0, 0, 1}, back)), up = cross(back, right);

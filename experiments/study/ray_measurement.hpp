@@ -27,7 +27,7 @@ RayStudy ray_study(std::string_view text);
 /// Returns the text with all its parts.
 std::string text_of(const RayStudy& study);
 
-/// Returns what tables add to the name of a scene: " (coherent rays)", " (incoherent rays, any)".
+/// Returns the suffix that tables add to a scene's name: " (coherent rays)", " (incoherent rays, any)".
 std::string suffix_of(const RayStudy& study);
 
 /// Makes the rays for the box around a scene's first, middle and last frame. Deterministic.
@@ -35,13 +35,13 @@ template <class S>
 std::vector<Ray<S>> make_rays(const RayStudy& study, const Scene<S>& scene,
                               const std::vector<double>& frames);
 
-/// A contestant, with what its record says of rays.
+/// A contestant, with its record's data about rays.
 template <class S>
 struct RayEntrant : Entrant<S> {
   RayCheck check;
   std::uint64_t hits = 0;  ///< of all rays at all frames
-  /// Bodies of polygons that no ray of a frame meets, summed over frames: what occlusion culling by these
-  /// rays skips.
+  /// Bodies of polygons that no ray of a frame meets, summed over frames: what occlusion culling can skip for
+  /// these rays.
   std::uint64_t hidden_bodies = 0;
 };
 

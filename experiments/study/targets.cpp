@@ -98,7 +98,7 @@ bool measures(const Study& study, const Target& target) {
          target.changes == (study.changes ? answer_word(*study.changes) : "");
 }
 
-/// Returns the name that targets and tables know a scene by in a study; empty if it has none.
+/// Returns the name of a scene in a study's tables and targets; empty if it has none.
 std::string name_in(const Study& study, const SceneSpec& spec) {
   const std::string name = given_name(spec);
   return name.empty() ? name : name + suffix_of(study);

@@ -14,7 +14,7 @@ struct Plan;
 inline constexpr const char* best_refit_word = "best_refit";
 
 /// Selects contestants by their description, and the phase whose time counts. Several may match (for example
-/// several leaf sizes): the one whose clip takes the shortest time stands for them all, in every phase.
+/// several leaf sizes): the one whose clip takes the shortest time represents them all, in every phase.
 struct TargetSelector {
   std::string strategy;              ///< id, or `best_refit_word`
   std::vector<std::string> or_else;  ///< ids of alternative strategies

@@ -67,7 +67,7 @@ std::vector<double> sorted_totals(const ClipTimes& clip) {
   return totals;
 }
 
-/// Makes the clip in equal parts, so that a structure that ages shows.
+/// Makes the clip in equal parts, so that the ageing of a structure is visible.
 json parts_record(const ClipTimes& clip) {
   const std::size_t frames = clip.frames.size(), parts = std::min(time_parts, frames);
   json over_time = json::array();
@@ -82,7 +82,7 @@ json parts_record(const ClipTimes& clip) {
   return over_time;
 }
 
-/// Several threads, asked for or seen at work: no frame has a time of its own.
+/// Several threads, requested or observed at work: single frames have no times of their own.
 By counted_by(const Measured& measured) {
   Effort effort;
   for (const ClipTimes& clip : measured.repetitions) effort += clip.effort;

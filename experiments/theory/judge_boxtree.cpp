@@ -19,7 +19,8 @@ Claim judge_boxtree_size(const std::vector<BoxTreeRun>& boxtrees) {
           "The kinetic BoxTree has at most two events per node, needs less memory than the kinetic AABB tree "
           "and has fewer events.",
       .citation = "section 6, Theorem 5",
-      .counter = "events alive per inner node; bytes and events beside the AABB tree's on one topology",
+      .counter =
+          "events alive per inner node; bytes and events compared with the AABB tree's on one topology",
       .bound = "two events per inner node; bytes and events of the AABB tree",
       .condition = "the root additionally stores its own six sides, which the paper omits",
       .data = boxtrees};
@@ -32,7 +33,7 @@ Claim judge_boxtree_size(const std::vector<BoxTreeRun>& boxtrees) {
     claim.criteria.push_back({"most events alive, " + place(run), double(run.queue_peak), Relation::at_most,
                               2 * double(run.inner_nodes) + 6 * double(run.trees), 0, always});
     const std::uint64_t roots = run.certificates - 2 * run.inner_nodes;
-    claim.criteria.push_back({"events beside those of inner nodes, " + place(run), double(roots),
+    claim.criteria.push_back({"events compared with those of inner nodes, " + place(run), double(roots),
                               Relation::at_most, 0, 0, as_stated});
     claim.criteria.push_back(
         {"bytes, " + place(run), double(run.bytes), Relation::at_most, double(run.aabb_bytes), 0, always});

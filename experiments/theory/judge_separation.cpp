@@ -108,7 +108,8 @@ Claim judge_list_size(const std::vector<ListSizeRun>& sizes) {
     }
     if (m.size() < 4) continue;
     const PowerFit fit = fit_power(m, list);
-    // "Practical cases" are scenes: one that grows faster is a condition, all together are a refutation.
+    // "Practical cases" are scenes: a single one that grows faster makes a condition, all together a
+    // refutation.
     claim.criteria.push_back({"lower end of the exponent's 95% interval, " + scene, fit.low,
                               Relation::at_most, 1, tolerance, as_stated});
     exponents.push_back(fmt::format("{} {:.2f} ({:.2f} to {:.2f})", scene, fit.exponent, fit.low, fit.high));

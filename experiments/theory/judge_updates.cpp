@@ -139,15 +139,15 @@ Claim judge_independent_of_frames(const std::vector<FrameRun>& frames) {
       const double off = std::abs(double(run->events) - double(first.events)) +
                          std::abs(double(run->values) - double(first.values));
       claim.criteria.push_back(
-          {"events and changes beside those of l = " + std::to_string(first.l) + ", " + place(*run), off,
-           Relation::equal, 0, 0, always});
+          {"events and changes compared with those of l = " + std::to_string(first.l) + ", " + place(*run),
+           off, Relation::equal, 0, 0, always});
       claim.criteria.push_back({"the log of changes is the same (1), " + place(*run), double(run->same_log),
                                 Relation::equal, 1, 0, always});
       const double expected = double(run->frames) / double(first.frames);
       const double measured = double(run->bottom_up_values) / double(first.bottom_up_values);
       claim.criteria.push_back(
-          {"bottom-up's values beside those of l = " + std::to_string(first.l) + ", " + place(*run), measured,
-           Relation::equal, expected, 0, always});
+          {"bottom-up's values compared with those of l = " + std::to_string(first.l) + ", " + place(*run),
+           measured, Relation::equal, expected, 0, always});
       spread = std::max(spread, off);
       differ += run->same_log != 1;
       grows = std::max(grows, measured);
@@ -186,7 +186,7 @@ Claim judge_optimal(const std::vector<ExactRun>& exact, const std::vector<LooseR
                               run.violation.empty() ? 0.0 : 1.0, Relation::equal, 0, 0, always});
     claim.criteria.push_back(
         {"net changes, " + place(run), double(run.net), Relation::equal, double(run.envelope), 0, always});
-    claim.criteria.push_back({"changes beyond net ones, beside those of ties, " + place(run),
+    claim.criteria.push_back({"changes beyond net ones, compared with those of ties, " + place(run),
                               double(run.logged) - double(run.net), Relation::equal,
                               double(run.several_steps), 0, always});
     claim.criteria.push_back({"changes beyond net ones, " + place(run), double(run.logged) - double(run.net),
@@ -200,7 +200,7 @@ Claim judge_optimal(const std::vector<ExactRun>& exact, const std::vector<LooseR
     claim.criteria.push_back({"constant boxes that do not contain a vertex at a frame, " + place(run),
                               double(run.swept_outside), Relation::equal, 0, 0, always});
     claim.criteria.push_back(
-        {"changes of the kinetic tree beside the updates of constant boxes, " + place(run),
+        {"changes of the kinetic tree compared with the updates of constant boxes, " + place(run),
          double(run.kinetic_values), Relation::at_most, double(run.swept_updates), 0, as_stated});
     kinetic += run.kinetic_values, outside += run.swept_outside;
     least_loose = std::min(least_loose, run.swept_looseness);
@@ -217,7 +217,8 @@ Claim judge_optimal(const std::vector<ExactRun>& exact, const std::vector<LooseR
   if (!loose.empty())
     claim.why += fmt::format(
         " Definition 1 requires containment only, and one constant box per node, swept over the clip, {} at "
-        "every frame with no update at all beside {} changes; the price is a looseness of {:.3g} to {:.3g}.",
+        "every frame with no update at all, against {} changes; the price is a looseness of {:.3g} to "
+        "{:.3g}.",
         outside == 0 ? "contains everything" : "does not contain everything", number(kinetic), least_loose,
         most_loose);
   return claim;

@@ -8,7 +8,7 @@
 namespace kbvh::theory {
 
 // The trees of this measurement are split on given axes. No registered strategy makes such trees, because
-// they only show what a search can cost; so this file has a forest of its own.
+// they only show what a search can cost; so this file has its own forest.
 
 namespace {
 

@@ -14,7 +14,7 @@ namespace kbvh::theory {
 /// counts, and it keeps the changes of bounds of its last event.
 class SteppedStrategy {
  public:
-  /// Makes the strategy and starts it at t. Throws as `create` and Params do.
+  /// Makes the strategy and starts it at t. Throws like `create` and Params.
   SteppedStrategy(const std::string& id, const std::map<std::string, std::string>& params,
                   const SceneView<float>& view, Playback<float>& playback, const Topologies& topologies,
                   double t) {
@@ -30,7 +30,8 @@ class SteppedStrategy {
   Strategy<float>& strategy() { return *strategy_; }
   EventSource<float>& source() { return *strategy_->events(); }
   std::uint64_t counted(Counter counter) const { return strategy_->counters()[counter]; }
-  /// Returns a counter of the strategy's own. Throws std::logic_error if the strategy has none of that name.
+  /// Returns one of the strategy's own counters. Throws std::logic_error if the strategy has none of that
+  /// name.
   std::uint64_t counted(std::string_view name) const {
     for (const Counters::Named& counter : strategy_->counters().named)
       if (counter.name == name) return counter.value;

@@ -113,8 +113,7 @@ class Runner {
   }
 
  private:
-  /// Returns whether this size is the one used where one suffices: the smallest from `wanted` on, else the
-  /// largest.
+  /// Returns whether this size is used when one suffices: the smallest from `wanted` on, else the largest.
   bool chosen(std::uint32_t size, std::uint32_t wanted) const {
     std::uint32_t best = 0, largest = 0;
     for (const std::uint32_t s : options_->sizes) {

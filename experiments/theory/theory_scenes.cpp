@@ -40,7 +40,7 @@ Scene<float> moving_scene(const std::string& family, std::uint32_t triangles, st
   spec.builtin = family;
   spec.options.triangles = triangles;
   spec.options.keyframes = keyframes;
-  // Bodies at rest are left out: as few triangles of them as possible, except for clouds, which come in
+  // Bodies at rest are left out, so they get as few triangles as possible; except for clouds, which come in
   // pairs.
   if (family != "random_soups" && family != "passing_spheres") spec.options.obstacle_triangles = 20;
   // The cloth's motion depends on its table, which keeps its usual number of triangles.

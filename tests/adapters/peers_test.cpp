@@ -1,4 +1,5 @@
-// The contestants from other libraries keep what they declare, on scenes that are awkward for them.
+// Peers (contestants from other libraries) keep their declared promises on scenes that are difficult for
+// them.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -13,7 +14,7 @@
 namespace {
 using namespace kbvh;
 
-/// The families of contestants that this build has from other libraries.
+/// The families of peers in this build.
 const std::vector<std::string> peers{KBVH_PEERS};
 
 bool is_peer(const Info& info) {
@@ -41,7 +42,7 @@ std::string describe(const Info& info, const std::map<std::string, std::string>&
   return text;
 }
 
-/// Every peer, under all its settings, that can play the scene.
+/// Calls the check for every peer, under all its settings, that can play the scene.
 template <class S, class Check>
 void for_each_peer(const Scene<S>& scene, Check&& check) {
   for (const StrategyEntry& entry : registry())
@@ -74,7 +75,7 @@ void keeps_guarantee(std::uint32_t frames_per_keyframe) {
       EXPECT_GT(session.strategy().bytes(), 0u);
     });
   }
-  // A peer may decline a kind of body, not the test.
+  // A peer may decline a kind of body, but must not decline the test.
   for (const auto& [peer, count] : played) EXPECT_GE(2 * count, scenes.size()) << peer;
   for (const StrategyEntry& entry : registry()) {
     if (!is_peer(entry.info) || entry.factory<S>() == nullptr) continue;
@@ -90,7 +91,8 @@ TEST(Peers, KeepTheirGuaranteeInDouble) {
   keeps_guarantee<double>(3);
 }
 
-/// Bodies of lattice points at random scales and offsets: contact is the rule, and so is every rounding.
+/// Bodies of lattice points at random scales and offsets: nearly all touch, and nearly all numbers are
+/// rounded.
 template <class S>
 void never_lose_contacts(std::uint32_t seeds) {
   std::uint64_t pairs = 0;
@@ -128,7 +130,7 @@ TEST(Peers, RefuseToGoBackInTime) {
     session.reset(1);
     session.advance(2, times);
     EXPECT_THROW(session.advance(1.5, times), std::invalid_argument);
-    session.reset(0);  // starting over is what may go back
+    session.reset(0);  // only starting over may go back in time
     EXPECT_NO_THROW(session.advance(.5, times));
   });
 }
@@ -187,8 +189,8 @@ Scene<S> soups_within(double most, bool aside) {
                        adapters_test::soup<S>({.scale = scale, .offset = offset, .size = .25, .seed = 32})});
 }
 
-/// Within its range a peer answers, with its own test of triangles as well; beyond, it says so before it
-/// plays.
+/// Within its range a peer answers, also with its own test of triangles; beyond it, the peer reports that
+/// before it plays.
 template <class S>
 void range_is_kept() {
   std::size_t limited = 0;
@@ -215,7 +217,7 @@ void range_is_kept() {
     const Scene<S> beyond = soups_within<S>(2 * most, false);
     EXPECT_TRUE(unsuitable_bodies(entry.info, beyond).starts_with("takes coordinates up to "));
     EXPECT_THROW(Session<S>(beyond, {&entry, {}, {}}), ConfigError);
-    // A motion that reaches beyond later: by a change of plans, at a knot of the new plan, by positions
+    // A motion that leaves the range later: by a change of plans, at a knot of the new plan, or by positions
     // handed in.
     Scene<S> scene = soups_within<S>(most / 4, false);
     PhaseTimes times;
@@ -265,7 +267,7 @@ TEST(Peers, StateTheirRangeInDouble) {
   range_is_kept<double>();
 }
 
-/// Bullet's margin of 1.0 is why its scene is scaled; the parameter shows the difference.
+/// Bullet's margin of 1.0 is the reason for scaling its scene; the parameter shows the difference.
 TEST(Bullet, ScalingKeepsFalsePairsOfSmallMeshesAway) {
   const auto found = std::find_if(registry().begin(), registry().end(),
                                   [](const StrategyEntry& entry) { return entry.info.id == "bullet_bvh"; });
@@ -281,8 +283,8 @@ TEST(Bullet, ScalingKeepsFalsePairsOfSmallMeshesAway) {
   EXPECT_GT(candidates("none"), 3 * candidates("fit"));
 }
 
-/// More than 4096 primitives, which Embree refits subtree by subtree, and one body of other than triangles.
-/// Checked builds also compare the roots of the two hierarchies, of which only one is collided.
+/// More than 4096 primitives, which Embree refits subtree by subtree, and one body that is not made of
+/// triangles. Checked builds also compare the roots of the two hierarchies, only one of which is collided.
 TEST(Embree, RefitsEitherGeometryOfLargerBodies) {
   const auto found = std::find_if(registry().begin(), registry().end(),
                                   [](const StrategyEntry& entry) { return entry.info.id == "embree_refit"; });
@@ -306,7 +308,7 @@ TEST(Embree, RefitsEitherGeometryOfLargerBodies) {
     }
 }
 
-/// Embree flushes denormals; nobody after it may notice.
+/// Embree flushes denormals; code that runs after it must not be affected.
 TEST(Embree, LeavesTheFloatingPointStateAlone) {
   const auto found = std::find_if(registry().begin(), registry().end(),
                                   [](const StrategyEntry& entry) { return entry.info.id == "embree_refit"; });
@@ -326,7 +328,7 @@ TEST(Embree, LeavesTheFloatingPointStateAlone) {
   }
 }
 
-/// A peer's own test of rays may differ from the exact answer, but not often on triangles in general
+/// A peer's own test of rays may differ from the exact answer, but only rarely on triangles in general
 /// position.
 TEST(Peers, RaysDifferFromTheTruthSeldom) {
   for (const std::uint32_t corners : {3u, 4u}) {

@@ -1,5 +1,5 @@
 #pragma once
-// Small scenes that are awkward for hierarchies and for libraries' shortcuts: contact, offsets, scale,
+// Small scenes that are difficult for hierarchies and for libraries' shortcuts: contact, offsets, scale,
 // degeneracy.
 #include <cmath>
 #include <random>
@@ -137,7 +137,7 @@ std::vector<kbvh::Scene<S>> awkward_scenes() {
     kbvh::Body<S> empty{"empty", {}, plans<S>(0, {{}})};
     scenes.push_back(scene<S>("one, none, many", {small, empty, large}));
   }
-  // Bodies at a distance, which overlap nowhere, and one that comes from far.
+  // Bodies at a distance, which never overlap, and one that comes from far away.
   {
     auto near = soup<S>({.seed = 16}), far = soup<S>({.offset = 50, .seed = 17});
     auto comet = soup<S>({.primitives = 20, .size = .4, .seed = 18});

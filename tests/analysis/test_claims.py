@@ -40,7 +40,7 @@ WORLD: dict[str, tuple[Any, ...]] = {
 
 
 def line(scene: str, size: int, l: int, strategy: str) -> Line:
-    """A result of a world in which everything that the paper says of its experiments is so."""
+    """A result of a world in which everything that the paper says of its experiments is true."""
     family, builder, each, interval, query, motion, events, values, loose = WORLD[strategy]
     result = synthetic.record(
         dict(id=strategy, title=strategy, family=family, builder=builder, query=1.0), scene, size + 400, "float", l, 3
@@ -76,7 +76,7 @@ def of(strategy: str, scene: Optional[str] = None) -> Where:
 
 
 def times(where: Where, phase: str, factor: Callable[[Line], float]) -> Callable[[list[Line]], None]:
-    """Multiplies a phase of the results that are meant."""
+    """Multiplies a phase of the selected results."""
 
     def change(lines: list[Line]) -> None:
         for one in filter(where, lines):
@@ -106,7 +106,7 @@ def l_of(one: Line) -> float:
     return float(one["scene"]["per_keyframe"])
 
 
-#: For each claim results that contradict it.
+#: For each claim, results that contradict it.
 CONTRADICTIONS: dict[str, Callable[[list[Line]], None]] = {
     "E1": counts(of("kinetic_aabb", "tablecloth"), "values_written", lambda _: 1e4),
     "E2": counts(of("kinetic_boxtree", "tablecloth"), "certificates_failed", lambda _: 10),
@@ -181,7 +181,7 @@ class TestVerdicts(ClaimsCase):
         self.assertIn("2006 against 2006 met from l = 10 on", row.condition)
 
     def with_another_tablecloth(self, change: Callable[[list[Line]], None] = lambda _: None) -> claims.Row:
-        """E1 with a tablecloth from a file beside ours, on l = 1 and 10 only; `change` is done to that one's results."""
+        """E1 with a tablecloth from a file in addition to ours, on l = 1 and 10 only; `change` is done to that one's results."""
         lines = world()
         others = [copy.deepcopy(one) for one in lines if one["scene"]["name"].startswith("tablecloth-16") and l_of(one) < 100]
         for one in others:

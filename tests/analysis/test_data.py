@@ -41,7 +41,7 @@ class Case(unittest.TestCase):
         self.address = f"http://127.0.0.1:{server.server_port}/"
         self.catalogue = Path(folder.name) / "data.json"
         self.enterContext(mock.patch.object(data, "CATALOGUE", self.catalogue))
-        # Proxies of this machine are no business of the server of this test.
+        # The server of this test is reached directly, not through this machine's proxies.
         self.enterContext(mock.patch.dict("os.environ", {"no_proxy": "*", "NO_PROXY": "*"}))
 
     def serve(self, *files, **more):
@@ -59,7 +59,7 @@ class Case(unittest.TestCase):
         return {"path": f"unc/{name}", "address": self.address + name, "size": len(content), "sha256": digest} | more
 
     def call(self, *words):
-        """Returns the exit code and everything that was said."""
+        """Returns the exit code and the whole output."""
         said = io.StringIO()
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             try:

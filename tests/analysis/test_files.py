@@ -1,4 +1,4 @@
-"""Files: what is said of errors of the system."""
+"""Files: the sentences about errors of the system."""
 
 from __future__ import annotations
 

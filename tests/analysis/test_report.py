@@ -106,7 +106,7 @@ class TestPage(ReportCase):
             for attribute in re.findall(r'src="([^"]*)"', page):
                 self.assertTrue(attribute.startswith("data:image/png;base64,"), attribute[:60])
             for attribute in re.findall(r'href="([^"]*)"', page):
-                # The explorer lies beside the report where its program is built; the report needs nothing of it.
+                # The explorer lies next to the report where its program is built; the report needs nothing of it.
                 beside = attribute == "explorer.html" or (self.folder / attribute).is_file()
                 self.assertTrue(attribute.startswith("#") or beside, attribute[:60])
             self.assertNotRegex(page, r"@import|url\(")

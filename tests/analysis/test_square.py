@@ -211,7 +211,7 @@ class TestPlans(unittest.TestCase):
 
 
 class Articles(HTMLParser):
-    """What of each claim is in sight (its summary), and what folds out."""
+    """The visible part of each claim (its summary), and the part that folds out."""
 
     def __init__(self) -> None:
         super().__init__()

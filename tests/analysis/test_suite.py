@@ -1,4 +1,4 @@
-"""tests/run stops at once, with the reason, where something that runs beside a build fails: played with programs that stand for
+"""tests/run stops at once, with the reason, where something that runs during a build fails: played with programs that stand for
 all those that it calls."""
 
 import os

@@ -119,7 +119,7 @@ for (const which of ["reference", "merged"]) {
   await page.close();
 }
 
-// --- two commits beside each other --------------------------------------------------------------------------
+// --- two commits side by side -------------------------------------------------------------------------------
 
 await check("merged: two commits, pair by pair", async () => {
   const page = await open("merged", "#view=versus&contestants=all");
@@ -322,7 +322,7 @@ await check("six lines, and the others on demand", async () => {
   }
 });
 
-await check("legends are beside the plot, or right above it in a narrow window", async () => {
+await check("legends are next to the plot, or right above it in a narrow window", async () => {
   for (const [width, beside] of [
     [1440, true],
     [390, false],

@@ -118,7 +118,7 @@ test('states survive a link; damaged ones are refused with the reason', async ()
   assert.throws(() => checkState(scene([{ name: 'b', vertices: 1, times: [0], positions: [[0, 0, 0]], indices: [4] }])), /index 4 with 1 vertices/);
 });
 
-test('names beside points do not cover each other, and those that must be seen are drawn', async () => {
+test('names next to points do not cover each other, and those that must be seen are drawn', async () => {
   const { drawNames } = await import('../../analysis/lab/src/views/dom.js');
   const context = { measureText: (text) => ({ width: 7 * text.length }), strokeText() {}, fillText() {} };
   let state = 5, left = 0;

@@ -1,7 +1,7 @@
-// Plays a scene of the lab natively and prints what the engine in the browser has to show:
+// Plays a scene of the lab natively and prints the results that the engine in the browser must reproduce:
 //   kbvh_lab_reference SCENE.json STRATEGY float64|float32 [PARAMETER=VALUE ...]
 // prints one JSON object: for every frame the positions, the bounds of the nodes, the pairs by the strategy
-// and by brute force, and the counters; and every event with what it changed.
+// and by brute force, and the counters; and every event with its changes.
 
 #include <algorithm>
 #include <cmath>
@@ -49,7 +49,8 @@ World world_of(const json& scene, kbvh::Precision precision) {
   return world;
 }
 
-/// The frame times of the program (frame_times in core/scene/scene.hpp), which no caller of the façade sees.
+/// The frame times of the program (frame_times in core/scene/scene.hpp), which callers of the façade do not
+/// see.
 std::vector<double> frames_of(const json& scene) {
   std::set<double> keyframes;
   for (const json& body : scene.at("bodies"))

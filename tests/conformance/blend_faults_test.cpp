@@ -1,5 +1,5 @@
-// The suite can fail for blended boxes: those of reduced models and of keyframes, sound and with one seeded
-// fault each. (family_faults_test.cpp: other families.)
+// The suite can fail for blended boxes: those of reduced models and of keyframes, without a fault and with
+// one seeded fault each. (family_faults_test.cpp: other families.)
 
 #include <gtest/gtest.h>
 
@@ -14,13 +14,13 @@ namespace {
 
 enum class BlendFault : std::uint8_t {
   none,
-  no_remainder,     // what the modes leave of the motion is forgotten
+  no_remainder,     // the motion that the modes do not capture is forgotten
   no_sign,          // coordinates count as positive
   small_mode,       // the largest coordinate is too small by a thousandth
   no_translation,   // the body stays where it was at the first frame
   swapped_weights,  // the keyframes of a segment are exchanged
-  one_keyframe,     // the boxes of the keyframe before are used until the next one
-  no_margin,        // boxes do without the margin for roundings
+  one_keyframe,     // the boxes of the previous keyframe are used until the next one
+  no_margin,        // boxes lack the margin for roundings
 };
 
 /// A source with a fault.
@@ -95,7 +95,7 @@ struct Targets {
 };
 
 /// Two crossing sheets, each the sum of a flat sheet and of three fixed displacements with coefficients of
-/// both signs: nothing but roundings remains of their motion.
+/// both signs, so that only roundings remain of their motion.
 template <class S>
 TestScene<S> three_modes() {
   constexpr int side = 9, keyframes = 5;
@@ -127,7 +127,7 @@ TestScene<S> three_modes() {
   return test;
 }
 
-/// The first violation.
+/// Returns the first violation.
 template <class S, template <class> class Strategy>
 std::string violation(const std::string& scene) {
   Info info;
@@ -178,7 +178,7 @@ TEST(BlendFaults, AForgottenTranslation) {
   expect_caught<Reduced<BlendFault::no_translation>::Strategy>("four_bodies_own_keyframes");
 }
 TEST(BlendFaults, NoMarginForARemainder) {
-  // In double the range of the remainder, which is measured with its roundings, hides what is missing here.
+  // In double the range of the remainder, which is measured including its roundings, hides the fault.
   const std::string in_float = violation<float, Reduced<BlendFault::no_margin>::Strategy>("three_modes");
   EXPECT_NE(in_float.find("protru"), std::string::npos) << in_float;
 }

@@ -1,6 +1,7 @@
-// Answers as changes, of every registered strategy and adapter on every synthetic scene: added up they equal
-// its full answers and the truth. Frames are skipped, other ones for candidates than for pairs; full answers
-// are asked in between; the clip is played up to a frame, and then again from the start.
+// Answers as changes, of every registered strategy and adapter on every synthetic scene: their sum equals the
+// strategy's full answers and the truth. Some frames are skipped, different ones for candidates and for
+// pairs; full answers are requested in between; the clip is played up to a frame, and then again from the
+// start.
 
 #include <gtest/gtest.h>
 
@@ -22,7 +23,7 @@ std::string check_changes(const StrategyEntry& entry, const TestScene<S>& test, 
   const std::vector<double> frames = test.frames.empty() ? frame_times(test.scene, l) : test.frames;
   const PlanScript<S>* const script = test.script.steps.empty() ? nullptr : &test.script;
   Session<S> session(test.scene, {&entry, params, builder});
-  // A reset forgets what was reported, and changes of plans and of geometry.
+  // A reset forgets the reported pairs, and changes of plans and of geometry.
   const std::size_t some = std::min<std::size_t>(frames.size(), 5);
   for (const std::size_t played : {some, frames.size()}) {
     const ChangesVerification result =
@@ -38,7 +39,7 @@ TEST_P(Changes, AddUpToTheAnswers) {
   const auto& [scene_name, id] = GetParam();
   const StrategyEntry& entry = find_strategy(id);
   const BuilderConfig builder = entry.info.topology.preferred;
-  // Comparing full answers is one function for all strategies: few frames show what they can.
+  // All strategies share one function that compares full answers: few frames suffice to test it.
   const bool compares = !entry.info.can.changes;
   const std::uint32_t l = compares ? 2 : scene_name.find("geometry") != std::string::npos ? 3 : 7;
   const auto in_float = synthetic_scene<float>(scene_name, l);
@@ -47,8 +48,8 @@ TEST_P(Changes, AddUpToTheAnswers) {
   EXPECT_EQ(check_changes(entry, in_double, l, {}, builder), "") << id << " on " << scene_name << ", double";
 }
 
-// Strategies with changes of their own, in other configurations: leaves of one primitive, every word of every
-// parameter, many frames in a segment and one, every frame asked.
+// Strategies with their own changes, in other configurations: leaves of one primitive, every word of every
+// parameter, segments of many frames and of one, a query at every frame.
 TEST_P(Changes, OfOwnMaking) {
   const auto& [scene_name, id] = GetParam();
   const StrategyEntry& entry = find_strategy(id);
@@ -124,7 +125,7 @@ enum class Fault : std::uint8_t {
   stale_after_reset
 };
 
-/// Tests all pairs of primitives, and answers changes in its own way, with a fault at the fourth answer.
+/// Tests all pairs of primitives, and finds changes in its own way, with a fault in the fourth answer.
 template <class S, Fault fault>
 class FaultyChanges : public CountedStrategy<S>, public AnswersChanges<S> {
  public:
@@ -199,7 +200,7 @@ PairBuffer sorted(PairBuffer pairs) {
   return pairs;
 }
 
-// Lists of both lengths, short and long, in which every byte of a pair differs, or only a few do.
+// Short and long lists, in which pairs differ in every byte or only in a few.
 TEST(SortPairs, EqualsTheStandardSort) {
   Random random(11);
   for (const std::size_t size : {0, 1, 2, 127, 128, 129, 1000, 5000})

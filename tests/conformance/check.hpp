@@ -19,8 +19,8 @@ inline bool in_both_scalars() {
   return std::getenv("KBVH_ONE_SCALAR") == nullptr;
 }
 
-/// Why the contestant does not take part in a scene (scalar, capability, size): "skipped: ..."; or an empty
-/// text.
+/// Returns why the contestant does not take part in a scene (scalar, capability, size): "skipped: ..."; or an
+/// empty text.
 template <class S>
 std::string skipped(const StrategyEntry& entry, const TestScene<S>& test) {
   if (entry.factory<S>() == nullptr) return "skipped: no such scalar";
@@ -63,8 +63,8 @@ Oracle<S>& shared_oracle(const TestScene<S>& test) {
       .second.oracle;
 }
 
-/// Runs one contestant over one scene and returns the first violation, or an empty text, or why it does not
-/// take part (`skipped`).
+/// Runs one contestant over one scene. Returns the first violation, an empty text, or the reason for not
+/// taking part (`skipped`).
 template <class S>
 std::string check(const StrategyEntry& entry, const TestScene<S>& test, std::uint32_t frames_per_keyframe,
                   const std::map<std::string, std::string>& params, const BuilderConfig& builder,
@@ -81,8 +81,8 @@ std::string check(const StrategyEntry& entry, const TestScene<S>& test, std::uin
   return {};
 }
 
-/// Requires that a strategy that changes its topology during the clip has its first topology, and answers,
-/// after a reset.
+/// Requires that, after a reset, a strategy that changes its topology during the clip has its first topology
+/// and answers again.
 inline void expect_reset_restores_topology(const StrategyEntry& entry) {
   const auto test = synthetic_scene<float>("sheets", 3);
   Session<float> session(test.scene, {&entry, {}, entry.info.topology.preferred});

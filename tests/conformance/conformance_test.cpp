@@ -1,5 +1,5 @@
 // Every registered strategy and adapter over every synthetic scene, against the brute-force oracle. Loops
-// over the registry: a strategy that is added is tested with no edit here.
+// over the registry: a new strategy is tested without any edit here.
 
 #include <gtest/gtest.h>
 
@@ -32,9 +32,9 @@ std::vector<std::string> all_scene_names() {
   return names;
 }
 
-/// Returns whether it is float's turn, where scenes are not played in both scalars: the scalars take turns
-/// from scene to scene, and within a scene by the number of frames a keyframe, so that every strategy is
-/// played in both.
+/// Returns whether it is float's turn when scenes are not played in both scalars. The scalars take turns from
+/// scene to scene, and within a scene by the number of frames per keyframe, so that every strategy is played
+/// in both.
 bool is_turn_of_float(const std::string& scene, std::uint32_t l) {
   static const std::vector<std::string> scenes = all_scene_names();
   const auto place = std::find(scenes.begin(), scenes.end(), scene) - scenes.begin();
@@ -80,7 +80,7 @@ std::vector<std::string> strategy_ids() {
   return ids;
 }
 
-/// Every strategy on every scene in which it takes part; scene by scene, so that its truth is found once.
+/// Every strategy on every scene in which it takes part, ordered by scene, so that each truth is found once.
 std::vector<std::pair<std::string, std::string>> scenes_with_contestants() {
   std::vector<std::pair<std::string, std::string>> cases;
   for (const std::string& scene : all_scene_names()) {
@@ -115,7 +115,7 @@ TEST_P(Configurations, AllConform) {
   };
   for (const std::string scene_name : {"sheets", "integer_ties", "plan_changes", "geometry_changes",
                                        "self_rolled_cloth", "self_plan_changes"}) {
-    // Scripts make every frame dear: fewer frames and leaf sizes.
+    // Scripts make every frame expensive: fewer frames and leaf sizes.
     const bool scripted = scene_name != "sheets" && scene_name != "integer_ties";
     const std::uint32_t l = scripted ? 2 : 7;
     const auto in_float = synthetic_scene<float>(scene_name, l);
@@ -138,7 +138,8 @@ TEST_P(Configurations, AllConform) {
 INSTANTIATE_TEST_SUITE_P(Registry, Configurations, testing::ValuesIn(strategy_ids()),
                          [](const auto& test) { return test.param; });
 
-// Positions, refits, queries and triangle tests by every other set of kernels that this machine can run.
+// Tests positions, refits, queries and triangle tests with every other set of kernels that this machine can
+// run.
 class Kernels : public testing::TestWithParam<KernelSet> {};
 
 TEST_P(Kernels, Conform) {
@@ -158,7 +159,7 @@ TEST_P(Kernels, Conform) {
   for (const std::string scene_name : {"sheets", "integer_ties"}) {
     const auto found = std::find_if(registry().begin(), registry().end(),
                                     [](const StrategyEntry& entry) { return entry.info.id == "bottom_up"; });
-    if (found == registry().end()) break;  // a suite over somebody else's strategies
+    if (found == registry().end()) break;  // a suite over other people's strategies
     const StrategyEntry& refit = *found;
     const auto in_float = synthetic_scene<float>(scene_name, 7);
     const auto in_double = synthetic_scene<double>(scene_name, 7);
@@ -174,7 +175,7 @@ TEST_P(Kernels, Conform) {
   use_kernel_set(before);
 }
 
-/// The set in use is that of all other tests.
+/// All other tests cover the set in use.
 std::vector<KernelSet> other_kernel_sets() {
   std::vector<KernelSet> sets = supported_kernel_sets();
   std::erase(sets, active_kernel_set());
@@ -231,7 +232,7 @@ TEST(Threads, GiveTheSameAnswers) {
     }
 }
 
-// Cases that would be skipped are not made; a strategy without any would be tested by nothing.
+// Cases that would be skipped are not generated, so a strategy could end up without any test.
 TEST(Registry, EveryStrategyTakesPart) {
   std::map<std::string, std::size_t> scenes;
   for (const auto& [scene, id] : scenes_with_contestants()) ++scenes[id];
@@ -268,9 +269,9 @@ TEST(Registry, SelfPairsAreDeclaredOrRefused) {
       EXPECT_THROW(make(), ConfigError) << entry.info.id;
     (entry.info.can.self_pairs ? able : refusing).insert(entry.info.id);
   }
-  // A program may have a few strategies only. Contract.RefitsAnswerPairsWithinABody looks at all of them.
+  // A program may have a few strategies only. Contract.RefitsAnswerPairsWithinABody checks all of them.
   EXPECT_FALSE(able.empty() && refusing.empty());
-  // Scenes of this kind would prove nothing if there were nothing to find.
+  // Scenes of this kind prove nothing if there are no such pairs.
   Playback<float> playback(test.scene);
   playback.seek(4);
   std::size_t within = 0;
@@ -306,8 +307,8 @@ void expect_all_values_are_taken() {
   }
 }
 
-// The declaration alone decides which values a parameter has: a study whose parameters were accepted does not
-// stop at a strategy.
+// The declaration alone decides which values a parameter accepts: a study whose parameters were accepted
+// never fails in a strategy.
 TEST(Registry, EveryStrategyTakesTheValuesThatItDeclares) {
   expect_all_values_are_taken<float>();
   expect_all_values_are_taken<double>();
@@ -345,8 +346,8 @@ TEST_P(Configurations, TimeRunsForwardAndResetStartsOver) {
   run(synthetic_scene<double>("sheets"));
 }
 
-// Strategies that answer intervals: at every frame of an interval the spans that hold then contain the truth,
-// and confirming them leaves exactly that.
+// Strategies that answer intervals: at every frame of an interval the spans that contain it include the
+// truth, and confirming them yields exactly the truth.
 class Spans : public testing::TestWithParam<std::tuple<std::string, std::string>> {};
 
 template <class S>
@@ -354,7 +355,7 @@ void expect_spans_enclose(const StrategyEntry& entry, const TestScene<S>& test, 
   if (entry.factory<S>() == nullptr) return;
   if (has_self_pairs(test.scene.pairs) && !entry.info.can.self_pairs) return;
   Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred});
-  // The frames are looked at by a second playback, which makes the same changes.
+  // A second playback, which makes the same changes, provides the frames.
   const SceneView<S> view(test.scene);
   Playback<S> playback(test.scene);
   const SampledMotion<S> motion(playback);
@@ -372,7 +373,7 @@ void expect_spans_enclose(const StrategyEntry& entry, const TestScene<S>& test, 
   };
   change_plans(frames.front());
   for (std::size_t begin = 0; begin < frames.size();) {
-    // To the next frame at which plans change, or some frames further: intervals of uneven length.
+    // Advances to the next frame at which plans change, or by some frames: intervals of uneven length.
     std::size_t end = std::min(begin + 1 + begin % 5, frames.size() - 1);
     if (step != test.script.steps.end())
       for (std::size_t f = begin; f < end; ++f)
@@ -430,7 +431,7 @@ INSTANTIATE_TEST_SUITE_P(Registry, Spans,
                            return std::get<0>(test.param) + "_on_" + std::get<1>(test.param);
                          });
 
-// Changes of geometry are made as a whole or refused as a whole, before the strategy hears of them.
+// Changes of geometry are made as a whole or refused as a whole, before the strategy sees them.
 TEST_P(Configurations, ChangesOfGeometryAreRefusedAsAWhole) {
   const StrategyEntry& entry = find_strategy(GetParam());
   const auto run = [&](const auto& test) {
@@ -459,7 +460,7 @@ TEST_P(Configurations, ChangesOfGeometryAreRefusedAsAWhole) {
     session.change_geometry(change, times);
     EXPECT_FALSE(session.scene().bodies[0].primitives.alive(5));
     EXPECT_TRUE(test.scene.bodies[0].primitives.alive(5)) << "the caller's scene stays as it was";
-    // A reset starts over, with the geometry that there was.
+    // A reset starts over, with the current geometry.
     session.reset(0);
     session.advance(1, times);
     session.query(after, times);

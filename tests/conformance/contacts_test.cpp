@@ -1,4 +1,4 @@
-// Contacts between keyframes: every strategy that declares them against every feature with every other, on
+// Contacts between keyframes: every strategy that declares them, against brute force over all features, on
 // the synthetic scenes whose bodies are triangles.
 #include "core/continuous/contacts.hpp"
 
@@ -69,7 +69,7 @@ void expect_contacts(const StrategyEntry& entry, const Scene<S>& scene, const Tr
   if (entry.factory<S>() == nullptr) return;
   Session<S> session(scene, {&entry, params, builder});
   PhaseTimes ignored;
-  // More than once, for `reset` starts over.
+  // Several rounds, because `reset` starts over.
   for (int round = 0; round < rounds; ++round) {
     session.reset(truth.knots[0]);
     for (std::size_t k = 0; k < truth.contacts.size(); ++k) {
@@ -92,7 +92,7 @@ void expect_contacts(const StrategyEntry& entry, const Scene<S>& scene, const Tr
 class Contacts : public testing::TestWithParam<std::string> {};
 
 TEST_P(Contacts, AreThoseOfEveryFeatureWithEveryOther) {
-  // Nearly every decision there is one for exact arithmetic, or one with integers of thousands of bits.
+  // Nearly every decision in these scenes needs exact arithmetic, some with integers of thousands of bits.
   const bool costly = GetParam() == "extreme_velocities" || GetParam() == "integer_ties" ||
                       GetParam() == "self_sheets_crumpled" || GetParam() == "self_coincident";
   const auto run = [&](const auto& test) {
@@ -160,7 +160,7 @@ TEST(Features, EveryVertexAndEdgeHasOneOwner) {
   EXPECT_THROW(Features{quad}, std::invalid_argument);
 }
 
-/// A triangle falls through another, at half of the interval; the one keyframe of the other is at 0.
+/// A triangle falls through another one in the middle of the interval; the other one's only keyframe is at 0.
 Scene<float> falling_triangle(const std::vector<double>& interval) {
   Scene<float> scene;
   for (int body = 0; body < 2; ++body) {
@@ -193,7 +193,7 @@ TEST(ContactFinder, EnclosesTheTimeOfImpact) {
   EXPECT_LE(first->end - first->begin, 4 * impact_width + 1e-14);
 }
 
-// It is where the body is at all times: segments of others go on over it.
+// The body is at this keyframe's position at all times: segments of other bodies continue across it.
 TEST(ContactScenes, TheOneKeyframeOfABodyIsNoKnot) {
   const Scene<float> scene = falling_triangle({-1, 1});
   const Truth<float> truth = truth_of(scene);
@@ -208,7 +208,7 @@ TEST(ContactScenes, CountWhatBoxesCost) {
   const auto test = synthetic_scene<float>("self_rolled_cloth");
   const Truth<float> truth = truth_of(test.scene);
   for (const StrategyEntry& entry : registry()) {
-    if (!entry.info.can.contacts || entry.info.can.spans) continue;  // a list of pairs makes no boxes for it
+    if (!entry.info.can.contacts || entry.info.can.spans) continue;  // pair lists need no boxes for it
     Session<float> session(test.scene, {&entry, {}, entry.info.topology.preferred});
     PhaseTimes ignored;
     session.reset(truth.knots[0]);
@@ -220,7 +220,7 @@ TEST(ContactScenes, CountWhatBoxesCost) {
   }
 }
 
-// Boxes of pieces of segments are for frames; contacts are of whole segments.
+// Pieces of segments are for frames only; contacts use whole segments.
 TEST(ContactScenes, PiecesOfSegmentsMakeNoDifference) {
   const auto test = synthetic_scene<float>("self_rolled_cloth");
   const Truth<float> truth = truth_of(test.scene);
@@ -262,9 +262,9 @@ TEST(ContactScenes, ResetComesBetweenContactsAndFrames) {
   }
 }
 
-/// Plans change at every stop, some to lines without an end and some with knots of their own; geometry does
-/// at every second one, for those that can follow. A second scene and playback make the same changes, for the
-/// truth.
+/// Plans change at every stop, some to lines without an end and some with their own knots; geometry changes
+/// at every second stop, for strategies that can follow. A second scene and playback make the same changes,
+/// for the truth.
 template <class S>
 void expect_contacts_while_changing(const StrategyEntry& entry, const std::string& name, std::size_t& total) {
   const auto test = synthetic_scene<S>(name);

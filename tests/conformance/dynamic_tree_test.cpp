@@ -1,6 +1,6 @@
-// The dynamic tree: after any insertions and removals every box is that of its children and every search
-// finds what a comparison of all boxes finds; and the suite can fail for a strategy that uses the tree
-// wrongly.
+// The dynamic tree: after any insertions and removals every box is the union of its children's, and every
+// search finds the same pairs as a comparison of all boxes. Also: the suite can fail for a strategy that uses
+// the tree wrongly.
 
 #include "core/families/restructure/dynamic_tree.hpp"
 
@@ -103,7 +103,7 @@ enum class Fault : std::uint8_t {
   none,
   stays_in_old_box,  // every fourth primitive that leaves its box keeps it
   lost,              // every eighth removal is not followed by an insertion
-  wrong_place,       // a primitive is inserted with the box of the one before
+  wrong_place,       // a primitive is inserted with its predecessor's box
 };
 
 template <class S>

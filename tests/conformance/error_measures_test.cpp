@@ -1,6 +1,6 @@
-// What a verification says of errors is what was done wrong: a contestant that loses known pairs at known
-// frames, one that adds some, and triangles whose penetration is known. Dials of approximate contestants at
-// zero are exact.
+// A verification reports exactly the errors that were made: by a contestant that loses known pairs at known
+// frames, by one that adds some, and for triangles of known penetration. With all dials at zero, approximate
+// contestants are exact.
 
 #include <gtest/gtest.h>
 
@@ -81,7 +81,8 @@ template <class S>
 void expect_known_errors() {
   const TestScene<S> test = scene_with_frames<S>("soups", 3);
   Oracle<S>& oracle = shared_oracle(test);
-  // What is lost, from the truth itself: the last pair of every frame with pairs, from the third on.
+  // The lost pairs, computed from the truth itself: the last pair of every frame with pairs, from the third
+  // on.
   Playback<S> playback(test.scene);
   std::uint64_t lost = 0, first = 0, pairs = 0;
   Penetration deepest;
@@ -111,7 +112,7 @@ void expect_known_errors() {
   EXPECT_GT(found.missed_deepest.depth, 0);
   EXPECT_TRUE(found.holds()) << "an approximate contestant promises nothing";
 
-  // Frames are counted, not comparisons.
+  // The unit is frames, not comparisons.
   const Verification sampled = verified(make_entry<Loses>(info()), test, 5);
   ASSERT_TRUE(sampled.first_missed.has_value());
   EXPECT_EQ(*sampled.first_missed % 5, 0u);
@@ -139,7 +140,7 @@ TEST(ErrorMeasures, PenetrationOfTrianglesIsTheShortestWayOut) {
     const Triangle spike = {{0, 0, -depth}, {0.5, 0, 5}, {-0.5, 0, 5}};
     EXPECT_DOUBLE_EQ(penetration_depth(floor, spike), depth);
     EXPECT_DOUBLE_EQ(penetration_depth(spike, floor), depth);
-    // Far away, the way out is the same but for roundings.
+    // Far away, the way out is the same up to roundings.
     Triangle a, b;
     for (int i = 0; i < 3; ++i)
       for (int axis = 0; axis < 3; ++axis) {
@@ -161,8 +162,8 @@ TEST(ErrorMeasures, PenetrationOfTrianglesIsTheShortestWayOut) {
   EXPECT_EQ(penetration_depth(floor, point), 0);
 }
 
-// A translation along the way out by a little more separates, by a little less does not: the exact test says
-// so.
+// A translation slightly longer than the way out separates, a slightly shorter one does not, by the exact
+// test.
 TEST(ErrorMeasures, PenetrationAgreesWithTheExactTest) {
   std::uint64_t state = 7, tried = 0;
   const auto next = [&] {
@@ -180,7 +181,7 @@ TEST(ErrorMeasures, PenetrationAgreesWithTheExactTest) {
     }
     ++tried;
     const double depth = penetration_depth(a, b);
-    // No direction leads out on a shorter way.
+    // No direction is a shorter way out.
     for (int direction = 0; direction < 50; ++direction) {
       double way[3], length = 0;
       for (double& x : way) {
@@ -196,7 +197,7 @@ TEST(ErrorMeasures, PenetrationAgreesWithTheExactTest) {
   }
 }
 
-/// The dials at which each approximate strategy is exact.
+/// The settings at which each approximate strategy is exact.
 const std::vector<std::pair<std::string, std::map<std::string, std::string>>> exact_dials{
     {"reduced_refit", {}},
     {"reduced_refit", {{"query", "slabs"}}},
@@ -239,7 +240,7 @@ INSTANTIATE_TEST_SUITE_P(Registry, DialsAtZero, testing::ValuesIn([] {
                          }()),
                          [](const auto& test) { return test.param; });
 
-// And turned, each dial costs pairs: it does what it says.
+// When turned up, each dial costs pairs.
 TEST(Dials, CostPairsWhenTurned) {
   const TestScene<double> test = scene_with_frames<double>("soups", 7);
   const std::vector<std::pair<std::string, std::map<std::string, std::string>>> turned{
@@ -254,9 +255,9 @@ TEST(Dials, CostPairsWhenTurned) {
     EXPECT_TRUE(found.first_missed.has_value()) << id;
     EXPECT_EQ(found.extra > 0, params.count("tests") != 0) << id;
   }
-  // Boxes of few digits leave vertices outside; whether that costs a pair is chance.
+  // Boxes of few digits leave vertices outside; whether this costs a pair is a matter of chance.
   EXPECT_GT(verified(find_strategy("reduced_refit"), test, 1, {{"boxes", "bfloat16"}}).audit.protrusion, 0);
-  // A margin gives some of them back, and the rarer the refit, the more are missed.
+  // A margin recovers some of them, and rarer refits miss more.
   const auto missed = [&](const char* every, const char* margin) {
     return verified(find_strategy("reduced_refit"), test, 1, {{"refit_every", every}, {"margin", margin}})
         .missed;

@@ -1,7 +1,6 @@
 // The suite can fail for the families beyond refits: linear bounds, the interval join with its span filter,
-// near pairs, sweeps of contacts, trees built at every frame and the sweep
-// on one axis, each in its simplest form, sound and with one seeded fault. (faults_test.cpp: the
-// others.)
+// near pairs, sweeps of contacts, trees built at every frame and the sweep on one axis, each in its simplest
+// form, without a fault and with one seeded fault. (faults_test.cpp: the others.)
 
 #include <gtest/gtest.h>
 
@@ -20,24 +19,24 @@ namespace {
 
 enum class Fault : std::uint8_t {
   none,
-  stale_segment,    // every second segment is not made: the one before is used on
+  stale_segment,    // every second segment is not made: the previous one stays in use
   reversed_time,    // the ends of a segment are exchanged
-  small_margin,     // boxes are smaller than they should be by a thousandth
+  small_margin,     // boxes are too small by a thousandth
   plans_forgotten,  // changes of plans are not followed
-  late_begin,       // pairs are reported a twentieth of the segment after they begin
-  early_end,        // and a twentieth before they end
-  overdue_verdict,  // what was proved of a pair at the segment's begin is reported throughout
-  small_closing,    // bodies are taken to close in by a tenth of what they can
-  stale_rows,       // a search reads the leaves of the search before
-  ends_only,        // a sweep looks at where the motion ends
-  lost_primitive,   // a sort loses a primitive: another one is there twice
+  late_begin,       // pairs are reported a twentieth of the segment late
+  early_end,        // and dropped a twentieth early
+  overdue_verdict,  // a verdict at the segment's begin is reported throughout
+  small_closing,    // bodies are assumed to close in by a tenth of the bound
+  stale_rows,       // a search reads the leaves of the previous search
+  ends_only,        // a sweep considers only the end of the motion
+  lost_primitive,   // a sort loses a primitive and repeats another one
   short_leaf,       // a leaf ends one primitive early
-  unmade_tree,      // every eighth tree is not built: the one before is used on
-  unsorted_boxes,   // boxes are swept on another axis than the one that they are sorted on
+  unmade_tree,      // every eighth tree is not built: the previous one stays in use
+  unsorted_boxes,   // boxes are swept on a different axis than they are sorted on
   unmade_boxes,     // boxes are those of the first frame
 };
 
-/// Boxes linear in time, one query a frame.
+/// Boxes linear in time, with one query per frame.
 template <class S, Fault fault>
 class Linear : public CountedStrategy<S>, public TakesPlanChanges<S> {
  public:
@@ -74,7 +73,7 @@ class Linear : public CountedStrategy<S>, public TakesPlanChanges<S> {
     return {};
   }
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
-    if (fault == Fault::reversed_time) return {};  // the pairs must tell
+    if (fault == Fault::reversed_time) return {};  // the pairs must show the fault
     AuditView view = bounds_.audit_view(body, this->time());
     if (fault == Fault::small_margin)
       for (Box<double>& box : view.boxes)
@@ -101,7 +100,7 @@ class Linear : public CountedStrategy<S>, public TakesPlanChanges<S> {
   std::uint64_t ends_ = 0;
 };
 
-/// One join for each segment, from which frames are read; with span tests where all bodies are triangles.
+/// One join for each segment, from which frames are read; with span tests if all bodies are triangles.
 template <class S, Fault fault>
 class Join : public CountedStrategy<S>, public TakesPlanChanges<S> {
  public:
@@ -162,7 +161,7 @@ class Join : public CountedStrategy<S>, public TakesPlanChanges<S> {
   std::uint64_t ends_ = 0;
 };
 
-/// One list of near pairs for all frames that the motion's bound allows.
+/// One list of near pairs for as many frames as the bound on the motion allows.
 template <class S, Fault fault>
 class Near : public StoredHierarchyStrategy<S> {
   using Base = StoredHierarchyStrategy<S>;

@@ -1,4 +1,4 @@
-// The conformance suite can fail: strategies with one seeded fault each are caught by the very check that the
+// The conformance suite can fail: it catches strategies with one seeded fault each by the same check that the
 // registered strategies pass.
 
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@ enum class Fault {
   swapped_axis,   // y and z of one box exchanged
   repeated_pair,  // the first pair is reported twice
   lost_pair,      // the last pair is not reported
-  too_loose,      // a valid box, but not tight, though tight is declared
+  too_loose,      // a valid box, but not tight, although tight is declared
   wrong_order,    // pairs reported with the bodies exchanged
 };
 
@@ -90,7 +90,7 @@ using TooLoose = FaultyRefit<S, Fault::too_loose>;
 template <class S>
 using WrongOrder = FaultyRefit<S, Fault::wrong_order>;
 
-/// Pairs of leaves from boxes read off the realisers, without anything kept from frame to frame.
+/// Finds pairs of leaves from boxes read off the realisers, and keeps nothing from frame to frame.
 template <class S, class Forest>
 QueryStatus implicit_candidates(const Forest& forest, const SceneView<S>& scene,
                                 const SampledMotion<S>& motion, std::vector<NodePair>& stack, PairBuffer& out,
@@ -107,7 +107,7 @@ QueryStatus implicit_candidates(const Forest& forest, const SceneView<S>& scene,
   return {};
 }
 
-/// A kinetic tree that loses one event: it leaves the queue and nobody handles it.
+/// A kinetic tree that loses one event: it leaves the queue without being handled.
 template <class S>
 class LostEvent : public Strategy<S> {
  public:
@@ -143,11 +143,11 @@ class LostEvent : public Strategy<S> {
 
 enum class LazyFault : std::uint8_t {
   none,
-  small_margin,  // boxes are inflated by three quarters of the margin that the motion is allowed
-  half_bound,    // the bound on the motion is taken for half of what it is
+  small_margin,  // boxes have three quarters of the margin that the motion may use
+  half_bound,    // the bound on the motion is halved
 };
 
-/// Inflated boxes that wait for the bound on the motion, in their simplest form.
+/// Inflated boxes that are kept as long as the bound on the motion allows, in their simplest form.
 template <class S, LazyFault fault>
 class FaultyMargin : public StoredHierarchyStrategy<S> {
   using Base = StoredHierarchyStrategy<S>;
@@ -200,8 +200,8 @@ using SmallMargin = FaultyMargin<S, LazyFault::small_margin>;
 template <class S>
 using HalfBound = FaultyMargin<S, LazyFault::half_bound>;
 
-/// Boxes below the root that are made when a query first asks; the fault takes back the mark of every fifth
-/// node and makes nothing.
+/// Boxes below the root that are made at a query's first request. With the fault, every fifth node loses its
+/// mark without being made.
 template <class S, LazyFault fault>
 class FaultyLazy : public StoredHierarchyStrategy<S> {
   using Base = StoredHierarchyStrategy<S>;
@@ -238,7 +238,7 @@ class FaultyLazy : public StoredHierarchyStrategy<S> {
     return {.hierarchy = &this->hierarchies_[body], .body = body, .stale = stale_[body].data()};
   }
   void update(std::uint32_t body) override {
-    this->refit(body);  // of which only the root's box is used
+    this->refit(body);  // only the root's box is used
     const std::uint32_t nodes = this->hierarchies_[body].node_count();
     stale_.resize(this->hierarchies_.size());
     stale_[body].assign(nodes, 1);
@@ -258,7 +258,7 @@ template <class S>
 using SoundLazy = FaultyLazy<S, LazyFault::none>;
 template <class S>
 using ForgetfulLazy = FaultyLazy<S, LazyFault::half_bound>;
-/// Forgets certificates near the root while the switch is on: nobody watches them from then on.
+/// While the switch is on, forgets certificates near the root, which are not checked from then on.
 template <class S>
 class ForgetfulQueue : public AvlQueue<S> {
  public:
@@ -269,8 +269,8 @@ class ForgetfulQueue : public AvlQueue<S> {
   bool forgets = false;
 };
 
-/// A kinetic tree that, when geometry changes, repairs leaves and what is near them, but not the certificates
-/// of the ancestors far above.
+/// A kinetic tree that, when geometry changes, repairs leaves and their surroundings, but not the
+/// certificates of distant ancestors.
 template <class S, bool faulty>
 class LocalRepair : public Strategy<S>, public TakesGeometryChanges<S> {
  public:
@@ -365,8 +365,7 @@ TEST(Faults, SoundMarginPasses) {
       EXPECT_EQ(violation<SoundMargin>("sound_margin", Tightness::conservative, scene, l), "|") << scene << l;
 }
 TEST(Faults, MarginTooSmall) {
-  // Where the fastest vertex flies along an axis, at the side of its box: at frames that use up most of the
-  // margin.
+  // The fastest vertex flies along an axis, at the side of its box: at frames that use up most of the margin.
   expect_caught(violation<SmallMargin>("small_margin", Tightness::conservative, "all_cross_at_once", 100),
                 "protrudes");
 }

@@ -1,4 +1,4 @@
-// The suite can fail for fronts: one in its simplest form, sound and with a seeded fault.
+// The suite can fail for fronts: one in its simplest form, without a fault and with a seeded fault.
 // (family_faults_test.cpp: other families.)
 
 #include <gtest/gtest.h>
@@ -12,8 +12,8 @@ namespace {
 
 enum class FrontFault : std::uint8_t {
   none,
-  no_descent,   // all pairs of children are taken for met: no entry ever descends again
-  wrong_climb,  // pairs of children are taken for dropped that are still in the front
+  no_descent,   // all pairs of children count as met: no entry ever descends again
+  wrong_climb,  // pairs of children that are still in the front count as dropped
 };
 
 template <FrontFault fault>
@@ -43,7 +43,7 @@ struct Fronts {
   };
 };
 
-/// The first violation.
+/// Returns the first violation.
 template <class S, FrontFault fault>
 std::string violation(const char* scene) {
   Info info;

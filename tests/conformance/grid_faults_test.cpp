@@ -1,4 +1,4 @@
-// The suite can fail for the hash grid: in its simplest form, sound and with one seeded fault.
+// The suite can fail for the hash grid: in its simplest form, without a fault and with one seeded fault.
 
 #include <gtest/gtest.h>
 

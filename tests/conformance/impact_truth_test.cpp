@@ -1,5 +1,5 @@
-// Continuous collision detection against ground truth that nobody here made: exact verdicts by computer
-// algebra (Wang et al. 2021).
+// Continuous collision detection against independent ground truth: exact verdicts by computer algebra (Wang
+// et al. 2021).
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -41,7 +41,7 @@ TEST(ImpactTruth, EveryVerdictIsRight) {
   EXPECT_EQ(stats.filtered + stats.exact, queries);
 }
 
-// The same without the filter, where that is a matter of seconds.
+// Does the same without the filter, where that takes only seconds.
 TEST(ImpactTruth, ExactArithmeticAloneIsRight) {
   const std::filesystem::path folder = data_folder() / "ccd" / "queries";
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << "no queries at " << folder << " (set KBVH_DATA)";

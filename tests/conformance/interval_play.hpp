@@ -35,7 +35,7 @@ struct BodyFlight {
   std::vector<Flight> primitives;
 };
 
-/// A body on its plans between two times that no knot lies between.
+/// A body on its plans between two times without a knot in between.
 template <class S>
 BodyFlight exact_flight(const Body<S>& body, double begin, double end) {
   std::vector<std::array<Line, 3>> vertices(body.plans.vertex_count());
@@ -63,7 +63,7 @@ BodyFlight exact_flight(const Body<S>& body, double begin, double end) {
   return flight;
 }
 
-/// All bodies over the present segment.
+/// All bodies over the current segment.
 template <class S>
 std::vector<BodyFlight> exact_flights(const Scene<S>& scene, const LinearBounds<S>& bounds) {
   const double end = std::isinf(bounds.end()) ? bounds.begin() : bounds.end();
@@ -73,7 +73,7 @@ std::vector<BodyFlight> exact_flights(const Scene<S>& scene, const LinearBounds<
 }
 
 /// Triangles in parallel planes, one body over the other, with gaps of some ulps that change by some ulps:
-/// here everything is a matter of margins, which are some ulps.
+/// the margins, which are some ulps as well, decide every pair.
 template <class S>
 Scene<S> grazing(S place) {
   Random random(61);
@@ -104,7 +104,7 @@ Scene<S> grazing(S place) {
   return scene;
 }
 
-/// These, near and far from the origin, and the synthetic scenes.
+/// These scenes, near and far from the origin, and the synthetic scenes.
 template <class S>
 Scene<S> scene_of(const std::string& name) {
   if (name == "grazing") return grazing<S>(1);

@@ -2,19 +2,19 @@
 // kernel set.
 //
 // Enough: a span encloses every instant at which the boxes of its two primitives, on the exact flight plans,
-// overlap; so it encloses every contact. A pair without a span has no such instant. Frames read from spans,
-// and then tested, are the truth of every frame.
+// overlap; so it encloses every contact. A pair without a span has no such instant. Frames read from spans
+// and then tested are the truth of every frame.
 //
-// Not much more: the join is of linear boxes, the exact ones at both ends of a segment and what lies between.
-// For each side, the gap g between two such boxes is linear in time. The join looks for g <= m, m being at
-// each end 6 u of one of the two coordinates x and y between which the gap is (WideEnds; u is half an
-// epsilon). What it computes of g - m is off by u |x| + u |y| for the stored positions, which are rounded,
-// and by u of the moved side; a difference of floats is off by parts of itself only. Where gaps matter |x|
-// and |y| are alike, so m lies between 5/2 u of the smaller and 10 u of the larger one. Nothing here is
-// relative to other coordinates than these two. Fractions are off by 2 roundings of a quotient and 2 of a
-// float, less than 2^-22, and 2^-20 is taken off and added. A pair without a time in common is kept if its
-// sides open no more than twice that before the last of them closes. So with F(h) the time when the last side
-// comes to g <= h, and U(h) that at which the first leaves it,
+// Not much more: the join uses linear boxes, which are exact at both ends of a segment and interpolated in
+// between. For each side, the gap g between two such boxes is linear in time. The join looks for g <= m,
+// where m is at each end 6 u of one of the two coordinates x and y that bound the gap (WideEnds; u is half an
+// epsilon). The computed g - m has an error of u |x| + u |y| for the stored positions, which are rounded, and
+// of u for the moved side; a difference of floats has only a relative error. Where gaps matter |x| and |y|
+// are nearly equal, so m lies between 5/2 u of the smaller and 10 u of the larger one. Nothing here is
+// relative to other coordinates than these two. Fractions have an error of 2 roundings of a quotient and 2 of
+// a float, less than 2^-22; 2^-20 is subtracted and added. A pair without a common time is kept if its sides
+// open no more than twice that before the last of them closes. So with F(h) the time when the last side comes
+// to g <= h, and U(h) the time when the first leaves it,
 //   F(10 u) - 5/4 2^-20 <= begin, and begin <= F(5/2 u) - 3/4 2^-20 unless it is 0,
 //   end <= U(10 u) + 5/4 2^-20, and U(5/2 u) + 3/4 2^-20 <= end unless it is 1,
 //   there is a span if F(5/2 u) <= U(5/2 u), and none if F(10 u) > U(10 u) + 5/2 2^-20.
@@ -32,7 +32,7 @@
 namespace kbvh::test::interval_spans_test {
 namespace {
 
-/// What is taken off a span's begin and added to its end.
+/// Subtracted from a span's begin and added to its end.
 const Rational outwards = exact(0x1p-20);
 
 // ---- Two boxes --------------------------------------------------------------------------------------------
@@ -53,7 +53,7 @@ Margin outer_margin() {
   return {0, exact(std::numeric_limits<S>::epsilon()) * 5, 2 * exact(std::numeric_limits<S>::min())};
 }
 
-/// The gap of the boxes at an end without a margin; what the linear boxes have between them is linear.
+/// The gap of the boxes at an end, without a margin; the gap of the linear boxes is linear in between.
 Rational gap(const Flight& a, const Flight& b, std::size_t side, int end, const Margin& margin) {
   const Flight &above = side < 3 ? a : b, &below = side < 3 ? b : a;
   const Rational &lower = above.lower[end][side % 3], &upper = below.upper[end][side % 3];
@@ -62,8 +62,8 @@ Rational gap(const Flight& a, const Flight& b, std::size_t side, int end, const 
          margin.least;
 }
 
-/// What doubles can tell of two linear boxes: a side keeps them further apart than a share of its coordinates
-/// throughout, or they overlap throughout.
+/// What doubles can decide about two linear boxes: a side keeps them further apart than a share of its
+/// coordinates throughout, or they overlap throughout.
 enum class Clearly : std::uint8_t { neither, apart, together };
 Clearly clearly(const Flight& a, const Flight& b, double share, double least) {
   bool together = true;
@@ -81,12 +81,12 @@ Clearly clearly(const Flight& a, const Flight& b, double share, double least) {
   return together ? Clearly::together : Clearly::neither;
 }
 
-/// First and last of the instants that have something.
+/// The first and the last of some instants.
 struct Instants {
   Rational first, last;
 };
 
-/// When the exact boxes overlap. A side keeps them apart as long as every corner of the one lies beyond every
+/// When the exact boxes overlap. A side keeps them apart as long as every corner of one box lies beyond every
 /// corner of the other: between the latest time at which one of these differences becomes positive and the
 /// earliest at which one ceases to be.
 std::optional<Instants> exact_overlap(const Flight& a, const Flight& b) {
@@ -124,7 +124,8 @@ std::optional<Instants> exact_overlap(const Flight& a, const Flight& b) {
   return found;
 }
 
-/// When the last side of the linear boxes comes to a gap of the margin or less, and when the first leaves it.
+/// When the last side of the linear boxes comes to a gap of the margin or less, and when the first one leaves
+/// it.
 std::optional<Instants> linear_overlap(const Flight& a, const Flight& b, const Margin& margin) {
   Instants found{0, 1};
   for (std::size_t side = 0; side < sides; ++side) {
@@ -138,7 +139,7 @@ std::optional<Instants> linear_overlap(const Flight& a, const Flight& b, const M
 
 // ---- All pairs --------------------------------------------------------------------------------------------
 
-/// How much was compared: a scene in which nothing meets would show nothing.
+/// The number of comparisons: a scene without contacts would prove nothing.
 struct Tally {
   std::size_t spans = 0, partly = 0;
 };
@@ -150,7 +151,7 @@ bool share_a_vertex(const Primitives& primitives, std::uint32_t a, std::uint32_t
   return false;
 }
 
-/// What is wrong with a span, or with there being none; nothing if it is as the comment above says.
+/// Returns the error of a span, or of its absence, according to the comment above; nothing if there is none.
 template <class S>
 std::string fault(const Flight& a, const Flight& b, const JoinedPair* span) {
   const bool whole = span != nullptr && span->begin == 0 && span->end == 1;
@@ -171,7 +172,7 @@ std::string fault(const Flight& a, const Flight& b, const JoinedPair* span) {
 
 using SpanMap = std::map<std::pair<std::uint32_t, std::uint32_t>, JoinedPair>;
 
-/// All pairs of primitives of each pair of bodies over the present segment.
+/// All pairs of primitives of each pair of bodies over the current segment.
 template <class S>
 void check_spans(const Play<S>& play, Tally& tally) {
   const LinearBounds<S>& bounds = play.joiners.front()->bounds;
@@ -195,7 +196,7 @@ void check_spans(const Play<S>& play, Tally& tally) {
         const Clearly known = clearly(a, b, 16 * double(std::numeric_limits<S>::epsilon()),
                                       4 * double(std::numeric_limits<S>::min()));
         if (known == Clearly::apart) continue;
-        std::optional<JoinedPair> right;  // kernel sets say the same: it is looked at once
+        std::optional<JoinedPair> right;  // kernel sets agree: it is checked once
         for (std::size_t k = 0; k < spans.size(); ++k) {
           const auto found = spans[k].find({p, q});
           const JoinedPair* span = found == spans[k].end() ? nullptr : &found->second;
@@ -216,7 +217,8 @@ void check_spans(const Play<S>& play, Tally& tally) {
   }
 }
 
-/// What is read at a frame is what has the frame in its span, and what is true of that is all the truth.
+/// The pairs read at a frame are those whose spans contain the frame, and the true ones among them are the
+/// whole truth.
 template <class S>
 void check_frame(Play<S>& play) {
   const PairBuffer truth = brute_force_pairs(play.scene, play.playback);

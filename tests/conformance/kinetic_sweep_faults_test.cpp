@@ -1,5 +1,5 @@
-// The suite can fail for kinetic sweep and prune: in its simplest form, a box for each primitive, sound and
-// with one seeded fault.
+// The suite can fail for kinetic sweep and prune: in its simplest form, with a box for each primitive,
+// without a fault and with one seeded fault.
 
 #include <gtest/gtest.h>
 

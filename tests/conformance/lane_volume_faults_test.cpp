@@ -1,5 +1,5 @@
-// Faults seeded into spheres and oriented boxes by SIMD: each is found by the checks that every strategy
-// passes.
+// Faults seeded into the SIMD spheres and oriented boxes: the checks that every strategy passes find each of
+// them.
 
 #include <gtest/gtest.h>
 
@@ -15,7 +15,7 @@ enum class Fault : std::uint8_t {
   none,
   rounded_down,  ///< radii or halves too small by 2^-16 of themselves: more than all margins of roundings
   child_left,    ///< spheres of inner nodes that do not reach the points below their last child
-  late,          ///< volumes of points that have moved since
+  late,          ///< volumes of points that have since moved
   forgetful,     ///< a search that loses a pair now and then
 };
 

@@ -1,6 +1,5 @@
-// Leaves of a wide hierarchy that exchange primitives: the layout equals one that is made anew, sorts give
-// the tree of the median builder, and a strategy that sorts at every frame conforms, while seeded faults are
-// found.
+// Leaves of a wide hierarchy that exchange primitives: the layout equals a new one, sorts give the tree of
+// the median builder, and a strategy that sorts at every frame conforms, while seeded faults are found.
 
 #include <gtest/gtest.h>
 
@@ -35,7 +34,7 @@ struct Soup {
     hierarchy.positions_changed();
     hierarchy.refit(positions.data());
   }
-  /// Returns the first difference from a hierarchy that is laid out anew, or nothing.
+  /// Returns the first difference from a new layout, or nothing.
   std::string fault() {
     const Topology& topology = hierarchy.topology();
     if (const std::string broken = check_topology(topology, primitives()); !broken.empty()) return broken;
@@ -80,7 +79,7 @@ std::vector<BuilderConfig> configs() {
   return all;
 }
 
-// A strategy whose geometry vanishes at run time asks for this, too.
+// A strategy whose geometry vanishes at run time needs this, too.
 TYPED_TEST(LeafContentsOf, ATreeWithoutNodesOrOfOneLeafIsSorted) {
   using S = TypeParam;
   const BuilderConfig config{.method = BuildMethod::median, .width = 8, .leaf_size = 16};
@@ -192,7 +191,7 @@ TEST(MedianSort, TakesEqualKeysAndOneItem) {
 
 enum class Fault : std::uint8_t { none, boxes_before, lost_primitive };
 
-/// Sorts all primitives, and renews a third of the leaves, in turn.
+/// Sorts all primitives and renews a third of the leaves, alternately.
 template <class S, Fault fault>
 class Sorting : public StoredHierarchyStrategy<S>, public AnswersSelfPairs, public TakesGeometryChanges<S> {
   using Base = StoredHierarchyStrategy<S>;

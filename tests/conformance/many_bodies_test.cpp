@@ -1,5 +1,5 @@
-// Scenes of many small bodies, over the registry: answers, and what memory and box tests cost when the bodies
-// are more and each of them has as many neighbours as before.
+// Scenes of many small bodies, over the registry: answers, and the cost in memory and box tests when there
+// are more bodies, each with the same number of neighbours.
 
 #include <gtest/gtest.h>
 
@@ -21,8 +21,8 @@ PairBuffer true_pairs(const Scene<S>& scene, double t) {
   return sweep_pairs(scene, playback);
 }
 
-// The broad phase alone: against every pair of boxes, with pairs in any order, twice, and within one body,
-// and with bodies that have no box; from one search to the next bodies move far.
+// The broad phase alone: against every pair of boxes, with pairs in any order, repeated, and within one body,
+// and with bodies without a box; bodies move far from one search to the next.
 TEST(NearBodies, AreThoseWhoseBoxesOverlap) {
   Random random(3);
   for (const bool shuffled : {false, true})
@@ -121,15 +121,15 @@ TEST(ManyBodies, EventsNumberMoreThan65535Bodies) {
   EXPECT_GT(found, 0u);
 }
 
-/// Answers, bounds and spans at every frame, by the driver's own verification; with pairs within some bodies
-/// and changes of plans for those that take them.
+/// Answers, bounds and spans at every frame, by the driver's own verification; with pairs within some bodies,
+/// and with changes of plans for strategies that accept them.
 template <class S>
 void expect_conforming(const StrategyEntry& entry) {
   TestScene<S> test;
   test.scene = many_bodies<S>(60, 6);
   ASSERT_GT(test.scene.pairs.size(), 1000U);
   EXPECT_EQ(check(entry, test, 4, {}, entry.info.topology.preferred), "") << entry.info.id;
-  // Pairs in another order, and within bodies.
+  // Pairs in a different order, and within bodies.
   std::reverse(test.scene.pairs.begin(), test.scene.pairs.end());
   if (entry.info.can.self_pairs)
     for (std::uint32_t body = 0; body < 60; body += 7) test.scene.pairs.push_back({body, body});
@@ -157,8 +157,8 @@ TEST_P(ManyBodiesOf, Conform) {
   if (entry.factory<double>() != nullptr) expect_conforming<double>(entry);
 }
 
-// Twice the bodies at the same density, four times the pairs: memory and box tests go with the bodies. A pair
-// may take some bytes.
+// Twice the bodies at the same density, four times the pairs: memory and box tests grow with the bodies. A
+// pair may take some bytes.
 TEST_P(ManyBodiesOf, CostWhatBodiesCostAndNotTheirPairs) {
   const StrategyEntry& entry = find_strategy(GetParam());
   if (entry.factory<float>() == nullptr || entry.info.max_primitive_pairs != 0) return;
@@ -189,7 +189,7 @@ TEST_P(ManyBodiesOf, CostWhatBodiesCostAndNotTheirPairs) {
   EXPECT_LT(many.bytes, 2.6 * double(few.bytes) + 10.0 * double(many.pairs))
       << GetParam() << ", " << few.bytes;
   EXPECT_LT(many.tests, 2.6 * double(few.tests) + 1000) << GetParam() << ", " << few.tests;
-  // Of two trees or three, and of the pairs of boxes that a list holds, at most.
+  // At most the size of two or three trees, and of the pairs of boxes in a list.
   EXPECT_LT(many.bytes, 40'000.0 * 600 + 10.0 * double(many.pairs)) << GetParam();
 }
 

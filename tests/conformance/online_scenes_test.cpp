@@ -49,7 +49,7 @@ void every_strategy_equals_the_oracle(const Size& size) {
   const Scene<S> scene = experiments::assemble<S>(loaded);
   const PlanScript<S> script = experiments::record_reversals(scene, *loaded.reversal);
   const std::vector<double> frames = experiments::frames_of(*loaded.reversal);
-  // It is a scene of reversals, and stays one to the end.
+  // The scene has reversals, to the end.
   ASSERT_FALSE(script.empty());
   EXPECT_GT(script.steps.back().time, 0.8 * frames.back());
   Oracle<S> oracle(scene, {}, hash(script));  // each frame's truth is computed once for all
@@ -84,7 +84,7 @@ TEST(ReversingSpheres, EveryStrategyEqualsTheOracleOnEveryFrame) {
   }
 }
 
-// What the rule says: outward ones turn on contact, inward ones at the lowest radius, and nothing else does.
+// The rule: outward vertices turn on contact, inward ones at the lowest radius, and no others turn.
 TEST(ReversingSpheres, VerticesTurnByTheRule) {
   const auto loaded = spheres({320, 200});
   const Scene<double> scene = experiments::assemble<double>(loaded);
@@ -131,7 +131,7 @@ TEST(ReversingSpheres, AreRecordedOnce) {
   EXPECT_EQ(asked, 0) << "taken from the folder";
   std::filesystem::resize_file(file, std::filesystem::file_size(file) - 5);
   EXPECT_EQ(hash(experiments::recorded_reversals(scene, *loaded.reversal, folder, count)), hash(recorded));
-  EXPECT_GT(asked, 0) << "a damaged file is made anew";
+  EXPECT_GT(asked, 0) << "a damaged file is made again";
   std::filesystem::remove_all(folder);
 }
 

@@ -1,6 +1,6 @@
-// Plans that change at awkward moments, for every strategy that declares plan_changes: several at once, at
-// the exact time of an event, at keyframes, at the first and the last frame, thousands, of vertices that
-// nobody uses; and the errors, after which nothing has changed.
+// Plans that change at difficult moments, for every strategy that declares plan_changes: several at once, at
+// the exact time of an event, at keyframes, at the first and the last frame, thousands of them, and of unused
+// vertices; and errors, after which nothing has changed.
 
 #include <gtest/gtest.h>
 
@@ -26,7 +26,8 @@ PlanChange<S> goes_to(std::uint32_t body, std::uint32_t vertex, double when, S x
 
 class PlanChanges : public testing::TestWithParam<std::string> {
  protected:
-  /// Leaf of one and wide, full leaves: both ways a certificate can be about a changed vertex.
+  /// Leaves of one primitive, and wide, full leaves: both ways in which a certificate can involve a changed
+  /// vertex.
   template <class S>
   void conforms(const TestScene<S>& test, const std::string& what) {
     const StrategyEntry& entry = find_strategy(GetParam());
@@ -83,7 +84,7 @@ TEST_P(PlanChanges, AtTheExactTimeOfEvents) {
     }
   });
   // Two vertices on a line, at x = t and x = 4 - t: they meet at t = 2, where one of them, or both, turn
-  // back. After that they part without having crossed; then they are sent to meet at an integer time again.
+  // back. They part without having crossed, and are then sent to meet at an integer time again.
   const auto meeting = [](auto scalar, std::uint32_t turned) {
     using S = decltype(scalar);
     TestScene<S> test;
@@ -127,7 +128,7 @@ TEST_P(PlanChanges, AtKeyframesAndAtTheFirstAndTheLastFrame) {
         }
         test.script.steps.push_back({t, std::move(changes)});
       }
-      // The clip goes on after the last change.
+      // The clip continues after the last change.
       for (int f = 1; f <= 3; ++f) test.frames.push_back(keyframes.back() + 0.5 * f);
     });
 }
@@ -175,7 +176,7 @@ TEST_P(PlanChanges, ThousandsAtOnce) {
 TEST_P(PlanChanges, OfVerticesThatNoPrimitiveUses) {
   conforms_with("soups", 3, "a vertex without a primitive", [](auto& test) {
     using S = KBVH_SCALAR(test);
-    for (Body<S>& body : test.scene.bodies) {  // without every fourth triangle, whose vertices stay
+    for (Body<S>& body : test.scene.bodies) {  // removes every fourth triangle, but not its vertices
       Primitives fewer;
       for (std::uint32_t p = 0; p < body.primitives.count(); ++p)
         if (p % 4 != 1) fewer.add(body.primitives[p]);
@@ -188,7 +189,7 @@ TEST_P(PlanChanges, OfVerticesThatNoPrimitiveUses) {
   });
 }
 
-// Whatever is wrong with one of several changes, none is made: the clip goes on as if nobody had asked.
+// If any one of several changes is invalid, none is made: the clip continues as if there had been no request.
 TEST_P(PlanChanges, ErrorsChangeNothing) {
   const StrategyEntry& entry = find_strategy(GetParam());
   const auto run = [&](const auto& test) {
@@ -197,7 +198,7 @@ TEST_P(PlanChanges, ErrorsChangeNothing) {
     constexpr S infinity = std::numeric_limits<S>::infinity(), nan = std::numeric_limits<S>::quiet_NaN();
     const Contestant contestant{&entry, {}, entry.info.topology.preferred};
     Session<S> session(test.scene, contestant);
-    Session<S> other(test.scene, contestant);  // nobody asks it for changes
+    Session<S> other(test.scene, contestant);  // receives no requests for changes
     Playback<S> undisturbed(test.scene);
     PairBuffer pairs, expected;
     PhaseTimes times;
@@ -241,7 +242,7 @@ TEST_P(PlanChanges, ErrorsChangeNothing) {
   run(synthetic_scene<double>("soups", 3));
 }
 
-// A session that is reset plays the scene's own plans again, and then the script as before.
+// A reset session plays the scene's own plans again, and then the script as before.
 TEST_P(PlanChanges, ResetForgetsThem) {
   const StrategyEntry& entry = find_strategy(GetParam());
   const auto run = [&](const auto& test) {
@@ -281,8 +282,8 @@ TEST(PlanChange, BeyondTheAdmissibleRange) {
   EXPECT_FALSE(plans.moving());
 }
 
-// Plans that begin together are evaluated together; whoever joins and leaves, positions are those of the
-// pieces.
+// Plans that begin together are evaluated together; if vertices join and leave, positions are still those of
+// the pieces.
 template <class S>
 void evaluated_as_pieces() {
   constexpr std::uint32_t vertices = 300;

@@ -1,5 +1,5 @@
 // Segments that are repaired where plans change within them: an interval join in its simplest form conforms,
-// and so it does not with one seeded fault. (plan_changes_test.cpp and the suite: the registered strategies.)
+// and does not with one seeded fault. (plan_changes_test.cpp and the suite: the registered strategies.)
 
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ enum class Fault : std::uint8_t {
   leaf_left_out,  // changed leaves of the second body are not joined again
   root_left_out,  // the root's boxes are those before the change
   slabs_kept,     // the slabs of changed leaves are those before the change
-  span_not_cut,   // what was proved of a pair before the change is reported after it
+  span_not_cut,   // a verdict from before the change is reported after it
 };
 
 template <class S, Fault fault>
@@ -132,14 +132,14 @@ struct With {
   using Strategy = Repaired<S, fault>;
 };
 
-/// Small triangles that hover about a sheet of large ones: all slide along a tilted plane, and at every frame
-/// some of the small ones begin to rise or to sink. Their boxes overlap all the time, so slabs decide.
+/// Small triangles that hover over a sheet of large ones: all slide along a tilted plane, and at every frame
+/// some of the small ones begin to rise or to sink. Their boxes always overlap, so slabs decide.
 template <class S>
 TestScene<S> hovering() {
   constexpr std::uint32_t count = 24, frames = 60;
   std::mt19937 random(7);
   const auto number = [&](double low, double high) { return low + (high - low) * (random() / 4294967296.0); };
-  // Two directions of the plane, and across it.
+  // Two directions in the plane, and one across it.
   const double along[2][3] = {{0.8, 0, -0.6}, {0.36, 0.8, 0.48}}, across[3] = {0.48, -0.6, 0.64};
   TestScene<S> test;
   test.scene.name = "hovering";
@@ -191,7 +191,7 @@ TestScene<S> hovering() {
   return test;
 }
 
-/// Plays triangles whose plans change at every third frame or so, some with knots, and returns the first
+/// Plays triangles whose plans change at about every third frame, some with knots, and returns the first
 /// violation; counts the segments that were kept.
 template <class S, Fault fault>
 std::string violation(std::uint64_t& kept, const TestScene<S>& test) {
@@ -212,7 +212,7 @@ template <Fault fault>
 void expect(const std::string& expected, bool keeps) {
   std::uint64_t kept = 0;
   std::string in_float, in_double;
-  // A fault shows in one of the scenes.
+  // A fault must show in one of the scenes.
   for (const bool hovers : {false, true}) {
     const std::string one =
         violation<float, fault>(kept, hovers ? hovering<float>() : synthetic_scene<float>("plan_changes", 7));

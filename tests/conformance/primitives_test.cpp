@@ -1,4 +1,4 @@
-// Primitives that are not triangles, through the program's own readers and shapes: polygons of more corners,
+// Primitives other than triangles, through the program's own readers and shapes: polygons of more corners,
 // points, and control nets of spline surfaces, whose patches stay within the boxes of every strategy.
 
 #include <gtest/gtest.h>
@@ -96,7 +96,7 @@ class Primitives : public testing::TestWithParam<std::string> {
                              << (sizeof(S) == 4 ? ", float" : ", double");
   }
 
-  /// Evaluated points of every patch lie in the boxes of its leaf and of all nodes above.
+  /// Points evaluated on every patch lie in the boxes of its leaf and of all nodes above.
   template <class S>
   void patches_stay_in_boxes(const NurbsSurface& surface, std::uint64_t& points) {
     const StrategyEntry& entry = find_strategy(GetParam());
@@ -130,7 +130,7 @@ class Primitives : public testing::TestWithParam<std::string> {
               for (std::uint32_t above = node;; above = view->topology.parents[above]) {
                 const bool stale = !view->stale.empty() && view->stale[above] != 0;
                 for (std::size_t d = 0; !stale && d < 3; ++d) {
-                  // The evaluation above rounds; the boxes do not.
+                  // The evaluation above rounds, but the boxes do not.
                   ASSERT_GE(point[d], view->boxes[above].lower[d] - 1e-13) << GetParam() << " frame " << f;
                   ASSERT_LE(point[d], view->boxes[above].upper[d] + 1e-13) << GetParam() << " frame " << f;
                 }

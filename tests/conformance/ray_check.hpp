@@ -11,7 +11,7 @@ namespace kbvh::test {
 
 inline constexpr std::size_t most_frames = 4;
 
-/// What is asked at one frame, and the truth.
+/// The queries of one frame, and the truth.
 template <class S>
 struct FrameTruth {
   std::vector<Ray<S>> rays;
@@ -19,7 +19,7 @@ struct FrameTruth {
   PairBuffer pairs;
 };
 
-/// The truth of a scene by frame, found by the first contestant that comes there: all see the same positions.
+/// The truth of a scene by frame, found by the first contestant to reach it: all see the same positions.
 template <class S>
 using Truth = std::map<std::size_t, FrameTruth<S>>;
 
@@ -37,7 +37,7 @@ const FrameTruth<S>& truth_at(Truth<S>& truth, std::size_t frame, Session<S>& se
   return known;
 }
 
-/// Every frame where a script changes something, else a few of them.
+/// Returns every frame at which a script changes something, and a few of the others.
 template <class S>
 std::vector<double> some_frames(const TestScene<S>& test) {
   std::vector<double> frames = test.frames.empty() ? frame_times(test.scene, 3) : test.frames;
@@ -48,7 +48,7 @@ std::vector<double> some_frames(const TestScene<S>& test) {
   return some;
 }
 
-/// Plays a clip with rays and pairs in turn, and returns the first violation, or an empty text.
+/// Plays a clip with rays and pairs alternately, and returns the first violation, or an empty text.
 template <class S>
 std::string rays_violation(const StrategyEntry& entry, const TestScene<S>& test, const BuilderConfig& builder,
                            const std::map<std::string, std::string>& params, Truth<S>& truth,

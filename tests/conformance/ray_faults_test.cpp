@@ -1,4 +1,5 @@
-// The suite of rays can fail: a strategy in its simplest form, sound and with one seeded fault each.
+// The suite of rays can fail: a strategy in its simplest form, without a fault and with one seeded fault
+// each.
 
 #include <gtest/gtest.h>
 
@@ -13,16 +14,16 @@ enum class Fault : std::uint8_t {
   none,
   open_slabs,         // boxes are open sets: rays along their sides are dropped
   narrow_slabs,       // the slabs are rounded inwards
-  closest_not_kept,   // the first hit stays, whatever is found later
-  closest_not_exact,  // hits are compared by their rounded parameters, and the last of equal ones counts
-  early_limit,        // what begins beyond nine tenths of the closest hit is left out
+  closest_not_kept,   // the first hit stays, even if a closer one is found
+  closest_not_exact,  // hits are compared by rounded parameters; the last of equal ones counts
+  early_limit,        // anything beyond nine tenths of the closest hit is left out
   length_forgotten,   // rays have no end
-  last_body_only,     // bodies begin anew
+  last_body_only,     // the search starts over with each body
   stale_boxes,        // boxes are those of the first frame
-  one_triangle,       // polygons are their first triangle
+  one_triangle,       // only the first triangle of each polygon is tested
   untested,           // a primitive whose leaf is entered counts as any hit
   hidden_early,       // a body is hidden where its box begins beyond half of the closest hit
-  hidden_unsorted,    // bodies in the order of the scene: the first one that is hidden ends the search
+  hidden_unsorted,    // bodies in scene order: the first hidden one ends the search
   hidden_for_all,     // a body that the first ray does not enter is hidden from all rays
 };
 
@@ -104,7 +105,7 @@ class Simple : public CountedStrategy<S>,
       }
       return;
     }
-    // Bodies are seen as they were when the boxes were made.
+    // Uses the bodies' boxes from the time when they were made.
     order_.start(this->scene_, box_of);
     order_.follow(line_of(ray), limit, enter);
   }
@@ -159,7 +160,7 @@ class Simple : public CountedStrategy<S>,
       hit = {body, primitive, 0};
       return;
     }
-    // Both are asked again, so that exact comparison is RaySearch's.
+    // Tests both again, so that RaySearch does the exact comparison.
     TriangleTestStats stats;
     RaySearch<S> search(ray, RayQuery::closest);
     const auto offer = [&](std::uint32_t b, std::uint32_t p) {

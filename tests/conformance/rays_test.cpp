@@ -1,5 +1,5 @@
-// Rays at frames: every strategy that declares them against every primitive, on every synthetic scene,
-// between queries of pairs. Peers with a test of their own are counted, not judged.
+// Rays at frames: every strategy that declares them, against every primitive, on every synthetic scene,
+// between queries of pairs. Peers with their own test are counted, not judged.
 
 #include <gtest/gtest.h>
 
@@ -126,7 +126,7 @@ TEST(RaysOfStrategies, AreCheckedBeforeTheyAreFollowed) {
   const std::vector<Ray<float>> wrong{{{0, 0, 0}, {1, 0, 0}}, {{0, 0, 0}, {1, 0, 0}, -1}};
   EXPECT_THROW(session.hits(RayQuery::closest, wrong, std::span<RayHit>(hits), ignored),
                std::invalid_argument);
-  EXPECT_EQ(hits[0], (RayHit{7, 7, 7}));  // nothing is half done
+  EXPECT_EQ(hits[0], (RayHit{7, 7, 7}));  // no partial result
   EXPECT_THROW(session.strategy().hits_at(1e6, RayQuery::closest, one, std::span<RayHit>(hits).first(1)),
                std::invalid_argument);
 }

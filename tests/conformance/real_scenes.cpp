@@ -32,7 +32,7 @@ io::AnimatedMesh sequence(const std::string& name) {
   return mesh;
 }
 
-/// All bodies in the folder: every OBJ, with the PC2 beside it if there is one.
+/// All bodies in the folder: every OBJ, with the PC2 next to it if there is one.
 Meshes several_bodies(const fs::path& folder) {
   std::vector<fs::path> files;
   for (const auto& entry : fs::directory_iterator(folder))
@@ -117,7 +117,7 @@ experiments::LoadedScene load_real_scene(const std::string& name, std::size_t ke
       const scenes::Point centre{extent.centre[0], extent.centre[1], extent.centre[2]};
       scene.meshes.push_back(scenes::icosphere(keyframes == 0 ? 1280 : 320, centre, 0.45 * extent.radius));
     } else {
-      // The second sequence is brought to the place and half the size of the first.
+      // The second sequence is moved to the place of the first, and scaled to half its size.
       io::AnimatedMesh other = sequence(name.substr(plus + 1));
       const Extent from = extent_at_start(other);
       experiments::Placement placement;

@@ -1,5 +1,5 @@
-// The suite can fail for refits of moving regions: one in its simplest form, sound and with a seeded fault.
-// (family_faults_test.cpp: other families.)
+// The suite can fail for refits of moving regions: one in its simplest form, without a fault and with a
+// seeded fault. (family_faults_test.cpp: other families.)
 
 #include <gtest/gtest.h>
 
@@ -13,9 +13,9 @@ namespace {
 
 enum class RegionFault : std::uint8_t {
   none,
-  forgotten_end,   // what moved in the segment before does not reach its end
+  forgotten_end,   // vertices that moved in the previous segment do not reach its end
   no_parents,      // only nodes with leaves are refitted
-  early_region,    // the region of a segment is used in the one after
+  early_region,    // the region of a segment is used in the next one
   missing_corner,  // every fourth marked node is left out
 };
 
@@ -95,7 +95,7 @@ TestScene<S> moving_in_places() {
   return test;
 }
 
-/// The first violation.
+/// Returns the first violation.
 template <class S, RegionFault fault>
 std::string violation(std::uint32_t width) {
   Info info;

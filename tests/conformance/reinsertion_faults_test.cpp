@@ -1,5 +1,5 @@
-// The suite can fail for trees whose subtrees move: a refit with as many moves as pay, sound and with a
-// seeded fault.
+// The suite can fail for trees whose subtrees move: a refit with as many moves as pay, without a fault and
+// with a seeded fault.
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 
 namespace kbvh {
 
-/// Breaks a tree.
+/// Damages a tree.
 struct MovingTreeFaults {
   template <class S>
   static std::array<S, 8> own_box(MovingTree<S>& tree, std::uint32_t node) {
@@ -44,10 +44,10 @@ namespace {
 
 enum class MoveFault : std::uint8_t {
   none,
-  box_not_shrunk,      // the node that a child has left keeps its box
-  box_not_grown,       // and so does the node into which it came
-  lost_leaf,           // taken out and put nowhere
-  leaf_at_two_places,  // put somewhere and not taken out
+  box_not_shrunk,      // a node that a child has left keeps its box
+  box_not_grown,       // and so does the child's new parent
+  lost_leaf,           // taken out, but not inserted
+  leaf_at_two_places,  // inserted, but not taken out
 };
 
 template <MoveFault fault>
@@ -115,7 +115,7 @@ struct Moving {
   };
 };
 
-/// The first violation.
+/// Returns the first violation.
 template <class S, MoveFault fault>
 std::string violation(const char* scene, std::uint32_t leaf_size) {
   Info info;

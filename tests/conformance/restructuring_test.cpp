@@ -1,5 +1,5 @@
-// Strategies that restructure conform where they do so as often as they can: by default few of the suite's
-// small scenes age enough for that.
+// Strategies that restructure also conform when they do so as often as they can: by default few of the
+// suite's small scenes age enough.
 
 #include <gtest/gtest.h>
 
@@ -83,7 +83,7 @@ TEST_P(Restructuring, HappensAndIsTakenBackByReset) {
   EXPECT_EQ(found[0], found[1]);
 }
 
-/// Plays a clip in which nothing is asked but rays; returns the box tests of the last frame.
+/// Plays a clip with queries of rays only; returns the box tests of the last frame.
 std::uint64_t last_tests_of_rays(const Scene<float>& scene, const std::string& id,
                                  std::vector<RayHit>& hits) {
   Session<float> session(scene, {&find_strategy(id), {}, {}});

@@ -1,4 +1,4 @@
-// Segments cut into pieces, by number or until boxes are tight enough: guarantees stay, looseness follows the
+// Segments cut into pieces, by number or until boxes are tight enough: guarantees hold, looseness follows the
 // bound.
 
 #include <gtest/gtest.h>
@@ -68,7 +68,8 @@ double looseness(const std::string& scene, const std::map<std::string, std::stri
       .audit.looseness();
 }
 
-// A bound is kept in the middle of the first piece of each segment; over all frames nobody becomes looser.
+// The bound holds in the middle of the first piece of each segment; over all frames no strategy becomes
+// looser.
 TEST(SegmentCuts, MakeLooseBoxesTighter) {
   int much_tighter = 0;
   for (const std::string& scene : synthetic_scene_names()) {

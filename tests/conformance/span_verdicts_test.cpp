@@ -1,6 +1,6 @@
-// What is proved of a pair of triangles for a span of time, against rational arithmetic at times within it,
-// on the exact plan: apart means apart at all of them, intersecting means intersecting at all of them. And
-// what frames read of such proofs, with the rest tested, is the truth of every frame.
+// Verdicts on a pair of triangles for a span of time, against rational arithmetic at times within the span,
+// on the exact plan: apart means apart at all of them, intersecting means intersecting at all of them. Frames
+// that read such verdicts, and test the remaining pairs, give the truth of every frame.
 
 #include <gtest/gtest.h>
 
@@ -13,7 +13,7 @@
 namespace kbvh::test::span_verdicts_test {
 namespace {
 
-/// About as many pairs of a segment are looked at.
+/// Checks about this many pairs of a segment.
 constexpr std::size_t looked_at = 24;
 
 struct Tally {
@@ -54,7 +54,7 @@ std::vector<SpanVerdict> decide(const Joiner<S>& joiner, const Scene<S>& scene, 
   return verdicts;
 }
 
-/// A sample of the present segment's pairs: their spans, and the first quarters of these.
+/// A sample of the current segment's pairs: their spans, and the first quarters of these.
 template <class S>
 void check_verdicts(const Play<S>& play, Tally& tally) {
   const std::vector<BodyFlight> flights = exact_flights(play.scene, play.joiners.front()->bounds);
@@ -139,7 +139,7 @@ INSTANTIATE_TEST_SUITE_P(Scenes, SpanVerdicts,
 
 }  // namespace
 
-// The reference itself: touching, nested, crossing in one plane, degenerate.
+// Tests the reference itself: touching, nested, crossing in one plane, degenerate.
 TEST(RationalTriangles, KnowsTheOddCases) {
   using Triangle = std::array<RationalPoint, 3>;
   const Triangle floor{{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}}};
@@ -156,11 +156,11 @@ TEST(RationalTriangles, KnowsTheOddCases) {
   EXPECT_TRUE(meets({{{3, 3, 0}, {-1, -1, 0}, {1, 1, 0}}}));  // a segment in the plane
   EXPECT_TRUE(meets({{{1, 1, 1}, {1, 1, -2}, {1, 1, 0}}}));   // a segment across
   EXPECT_FALSE(meets({{{1, 1, 1}, {2, 1, 1}, {1, 2, 1}}}));   // parallel
-  EXPECT_FALSE(meets({{{3, 3, 0}, {3, 2, 0}, {5, 5, 0}}}));   // beside it, in one plane
-  EXPECT_FALSE(meets({{{3, 3, 1}, {3, 3, -1}, {5, 5, 0}}}));  // beside it
+  EXPECT_FALSE(meets({{{3, 3, 0}, {3, 2, 0}, {5, 5, 0}}}));   // next to it, in one plane
+  EXPECT_FALSE(meets({{{3, 3, 1}, {3, 3, -1}, {5, 5, 0}}}));  // next to it
   EXPECT_FALSE(meets({{{2, 3, 0}, {2, 3, 0}, {2, 3, 0}}}));   // a point of the plane
   EXPECT_FALSE(meets({{{5, 0, 0}, {6, 0, 0}, {8, 0, 0}}}));   // a segment beyond an edge, on its line
-  EXPECT_FALSE(meets({{{3, 2, -1}, {3, 2, 1}, {3, 2, 1}}}));  // a segment beside it
+  EXPECT_FALSE(meets({{{3, 2, -1}, {3, 2, 1}, {3, 2, 1}}}));  // a segment next to it
   const Triangle segment{{{0, 0, 0}, {2, 2, 2}, {1, 1, 1}}}, point{{{3, 3, 3}, {3, 3, 3}, {3, 3, 3}}};
   const Triangle on{{{1, 1, 1}, {1, 1, 1}, {1, 1, 1}}}, across{{{1, 1, 0}, {1, 1, 2}, {1, 1, 1}}};
   EXPECT_TRUE(RationalTriangles::intersect(segment.data(), on.data()));

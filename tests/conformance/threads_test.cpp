@@ -1,6 +1,6 @@
-// Strategies with a parameter `threads` answer the same on every number of threads: the same pairs in the
-// same order, the same positions, boxes and counters. Built with ThreadSanitizer, this program also looks for
-// unordered accesses (CONTRIBUTING.md).
+// Strategies with a parameter `threads` answer the same with any number of threads: the same pairs in the
+// same order, the same positions, boxes and counters. Built with ThreadSanitizer, this program also detects
+// data races (CONTRIBUTING.md).
 
 #include <gtest/gtest.h>
 
@@ -25,7 +25,7 @@ namespace kbvh::test {
 namespace {
 
 #if defined(KBVH_TEST_HAS_TBB)
-// Four threads on machines with fewer cores, too; before the registry states its parameters.
+// Allows four threads on machines with fewer cores, too; set before the registry states its parameters.
 const tbb::global_control four(tbb::global_control::max_allowed_parallelism, 4);
 #endif
 
@@ -56,7 +56,7 @@ Scene<S> sheets(std::uint32_t side, Self self) {
   return scene;
 }
 
-/// What a strategy answers, frame by frame, in the order in which it answers.
+/// The answers of a strategy, frame by frame, in its own order.
 template <class S>
 std::vector<std::uint64_t> answers(const StrategyEntry& entry, const Scene<S>& scene,
                                    std::map<std::string, std::string> params, std::uint32_t threads,
@@ -168,7 +168,7 @@ TEST(Workers, CallEachItemOnceWithARunnerOfItsOwn) {
 TEST(Workers, TakeItemsOfThoseWhoAreBehind) {
   if (most_threads() < 4) GTEST_SKIP() << "built without TBB";
   Workers workers(4);
-  for (const std::size_t slow : {std::size_t(0), std::size_t(40)}) {  // one runner's items take all the time
+  for (const std::size_t slow : {std::size_t(0), std::size_t(40)}) {  // one runner's items are slow
     std::vector<std::uint32_t> calls(160, 0);
     workers.for_each(calls.size(), [&](std::size_t item, std::uint32_t) {
       std::atomic<int> work{0};
@@ -183,7 +183,7 @@ TEST(Workers, TakeItemsOfThoseWhoAreBehind) {
 TEST(Workers, GiveARunnerTheSameItemsAgain) {
   if (most_threads() < 2) GTEST_SKIP() << "built without TBB";
   Workers workers(2);
-  // Whoever comes first may take the other's items, but his own are there for him at every call.
+  // The first runner to arrive may take the other's items, but its own are available to it at every call.
   std::vector<std::uint32_t> first(200);
   std::atomic<std::uint32_t> begun[2];
   std::size_t own = 0, calls = 0;
@@ -196,7 +196,7 @@ TEST(Workers, GiveARunnerTheSameItemsAgain) {
       while (work.fetch_add(1) < 2000) {
       }
     });
-    if (begun[0] != 1) continue;  // the other one did not come in time
+    if (begun[0] != 1) continue;  // the other one did not arrive in time
     ++calls;
     own += first[0] == 0 && first[1] == 1 ? 1 : 0;
   }
@@ -241,7 +241,7 @@ TEST(Workers, RefuseMoreThreadsThanThereAre) {
   EXPECT_THROW(Workers(most_threads() + 1), std::invalid_argument);
 }
 
-// The fault that a missing order of items would be: items in the order in which threads finish them.
+// The fault of an unordered implementation: items in the order in which threads finish them.
 TEST(Faults, AnOrderOfCompletionIsNotTheOrderOfItems) {
   if (most_threads() < 4) GTEST_SKIP() << "built without TBB";
   Workers workers(4);

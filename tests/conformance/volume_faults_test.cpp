@@ -1,5 +1,5 @@
-// Volumes that are a little too small are found by an audit that asks the volumes, and would not be found by
-// one that looks at boxes around them.
+// An audit of the volumes themselves finds volumes that are a little too small; an audit of the boxes around
+// them would not.
 
 #include <gtest/gtest.h>
 
@@ -15,7 +15,7 @@ namespace {
 
 constexpr double shrinkage = 2e-4;
 
-// Each kind shrunk where boxes look last: a k-DOP along its diagonals only.
+// Shrinks each kind where boxes do not show it: a k-DOP only along its diagonals.
 template <class S, int K>
 Dop<S, K> shrunk(Dop<S, K> dop) {
   for (std::size_t slab = 3; slab < dop.slabs; ++slab) {
@@ -40,7 +40,7 @@ enum class Fault : std::uint8_t { none, shrunk };
 /// What the audit is shown: the volumes, or boxes that enclose them.
 enum class Shown : std::uint8_t { volumes, boxes };
 
-/// Shrinks all volumes whose enclosing boxes do not give it away.
+/// Shrinks all volumes whose enclosing boxes do not reveal it.
 template <class S, class V, Fault fault, Shown shown>
 class FaultyVolumes : public VolumeStrategy<S, V> {
   using Base = VolumeStrategy<S, V>;
@@ -124,8 +124,8 @@ TEST(VolumeFaults, AShrunkOrientedBoxIsFoundByVolumesOnly) {
   expect_found_by_volumes_only<Obb>();
 }
 
-// One leaf or one parent that is too small is enough, by one unit in the last place: every volume is asked
-// about every vertex below it, whatever its children contain.
+// A single leaf or parent that is too small by one unit in the last place suffices: every volume is tested
+// with every vertex below it, independently of its children.
 template <class V>
 void expect_one_node_is_enough() {
   using S = VolumeScalar<V>;
@@ -148,7 +148,7 @@ void expect_one_node_is_enough() {
     EXPECT_EQ(sound.topology_error + sound.first_fault, "");
     EXPECT_EQ(sound.nodes, topology.size());
     EXPECT_GT(sound.area, 0);
-    // The fit of its own points, then less by one unit.
+    // Fits its own points, then shrinks by one unit.
     std::vector<S> points;
     std::vector<std::uint32_t> open{faulty};
     while (!open.empty()) {
@@ -177,7 +177,7 @@ void expect_one_node_is_enough() {
     EXPECT_GT(found.protrusion, 0) << faulty;
     EXPECT_NE(found.first_fault.find("node " + std::to_string(faulty)), std::string::npos)
         << found.first_fault;
-    // Stale nodes are skipped, and a missing volume is no sound hierarchy.
+    // Stale nodes are skipped, and a hierarchy with a missing volume is not sound.
     view.stale.assign(topology.size(), 0);
     view.stale[faulty] = 1;
     EXPECT_EQ(audit(view, body.primitives, positions).invalid, 0u);
@@ -198,7 +198,7 @@ TEST(VolumeFaults, OneNodeIsEnough) {
   expect_one_node_is_enough<Obb<float>>();
 }
 
-// k-DOPs by SIMD: sides of points that moved since, and a search that forgets a pair of leaves now and then.
+// SIMD k-DOPs: sides of points that have since moved, and a search that now and then loses a pair of leaves.
 enum class DopFault : std::uint8_t { none, late, forgetful };
 template <class S, DopFault fault>
 class FaultyDops : public DopHierarchy<S, 18> {

@@ -1,4 +1,4 @@
-// The generic refit with every kind of volume over every synthetic scene; and on topologies that are rotated
+// The generic refit with every kind of volume over every synthetic scene, and on topologies that are rotated
 // at every frame.
 
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ std::vector<std::string> every_scene() {
   return names;
 }
 
-/// What `check` says in both scalars; nothing if all is well, or if the scene is not for it.
+/// Returns the violations in both scalars; nothing if there are none, or if the scene is unsuitable.
 std::string violations(const StrategyEntry& entry, const std::string& scene, std::uint32_t l,
                        const std::map<std::string, std::string>& params) {
   const BuilderConfig& builder = entry.info.topology.preferred;
@@ -52,8 +52,8 @@ INSTANTIATE_TEST_SUITE_P(Registry, EveryVolume,
                            return std::get<0>(test.param) + "_on_" + std::get<1>(test.param);
                          });
 
-// Boxes and k-DOPs are tight, though the strategy as a whole only declares that it is conservative; and the
-// boxes are those of the refit that everything is measured against.
+// Boxes and k-DOPs are tight, although the strategy as a whole declares only that it is conservative; and the
+// boxes are those of the reference refit.
 TEST(EveryVolume, OfFixedDirectionsIsTight) {
   for (const std::string volume : {"aabb", "dop14", "dop18", "dop26"})
     for (const std::string scene : {"soups", "sheets", "pure_translation_far", "integer_ties"}) {
@@ -85,7 +85,7 @@ TEST(EveryVolume, BoxesAreThoseOfTheOtherRefit) {
   }
 }
 
-// Fewer candidates, for more work: what the kinds are there for.
+// The purpose of these kinds: fewer candidates, for more work.
 TEST(EveryVolume, KDopsLeaveFewerCandidatesThanBoxes) {
   const auto candidates = [](const std::string& volume) {
     const auto test = synthetic_scene<float>("soups", 3);
@@ -100,8 +100,7 @@ TEST(EveryVolume, KDopsLeaveFewerCandidatesThanBoxes) {
   EXPECT_LT(candidates("obb"), box);
 }
 
-/// Rotates a few random nodes of every body at each frame, after the refit: rotated volumes are what the
-/// query reads.
+/// Rotates a few random nodes of every body at each frame, after the refit: the query reads rotated volumes.
 template <class S, class V>
 class Rotating : public VolumeStrategy<S, V> {
   using Base = VolumeStrategy<S, V>;
@@ -157,7 +156,8 @@ class Rotations : public testing::TestWithParam<std::string> {};
 
 TEST_P(Rotations, AtEveryFrameKeepEveryGuarantee) {
   RotatingBoxes<float>::rotations = 0;
-  // Around the boxes of control nets, and of what meets them, k-DOPs are not those of the vertices.
+  // Around the boxes of control nets, and of primitives that meet them, k-DOPs differ from those of the
+  // vertices.
   const bool nets = GetParam().find("points") != std::string::npos;
   const Tightness dops = nets ? Tightness::conservative : Tightness::tight;
   for (const std::uint32_t l : {1u, 7u}) {

@@ -13,8 +13,8 @@ namespace {
 
 enum class Boxes : std::uint8_t { recomputed, as_before_the_edit };
 
-/// Edits every moving body at each frame, after the refit: rotates random nodes, regrows a subtree, and moves
-/// another one. The query reads the edited layout.
+/// Edits every moving body at each frame, after the refit: rotates random nodes, rebuilds a subtree, and
+/// moves another one. The query reads the edited layout.
 template <class S, Boxes boxes>
 class Restructuring : public StoredHierarchyStrategy<S>,
                       public AnswersSelfPairs,

@@ -1,5 +1,6 @@
 // A small scene from the input, played by every strategy in float and double, each frame compared with the
-// oracle. Seeds of strategies' own errors are rarely so short: three keyframes and a dozen triangles do.
+// oracle. Inputs that reveal strategies' own errors are rarely this short: three keyframes and a dozen
+// triangles suffice.
 
 #include <algorithm>
 #include <cstdio>
@@ -12,7 +13,7 @@
 namespace kbvh::fuzz {
 namespace {
 
-/// Takes numbers off the input; zeros when it is used up.
+/// Takes numbers from the input; zeros when it is used up.
 class Bytes {
  public:
   Bytes(const std::uint8_t* data, std::size_t size) : data_(data), left_(size) {}
@@ -91,7 +92,7 @@ Recipe recipe(Bytes& bytes) {
     PlanChange<float> change{.body = body, .vertex = vertex};
     PlanChange<double> change_double{.body = body, .vertex = vertex};
     for (int axis = 0; axis < 3; ++axis) {
-      // Not so fast that a vertex leaves the admissible range within the clip.
+      // Slow enough that no vertex leaves the admissible range within the clip.
       change.velocity[axis] = std::clamp(bytes.coordinate(), -1e20f, 1e20f);
       change_double.velocity[axis] = change.velocity[axis];
     }
@@ -119,7 +120,7 @@ void play(const Scene<S>& scene, const PlanScript<S>& script, std::uint32_t per_
       std::abort();
     };
     expect(verify(session, std::span<const double>(frames), oracle, changes), "");
-    // Once more from the start, without what has changed meanwhile.
+    // Plays it again from the start, without the changes made meanwhile.
     expect(verify(session, std::span<const double>(frames), unchanged), ", after a reset");
   }
 }

@@ -8,12 +8,12 @@
 #include <fstream>
 #include <string>
 
-/// What libFuzzer calls with each input; replay.cpp calls it with the inputs of tests/repro.
+/// libFuzzer calls this with each input; replay.cpp calls it with the inputs of tests/repro.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
 namespace kbvh::fuzz {
 
-/// A folder of this process, in memory where the system has such a place, that holds the input as a file.
+/// A folder of this process that holds the input as a file; in memory if the system has such a place.
 class InputFolder {
  public:
   InputFolder() {
@@ -30,7 +30,7 @@ class InputFolder {
   InputFolder& operator=(const InputFolder&) = delete;
 
   const std::filesystem::path& path() const { return path_; }
-  /// The file's name after it has been written anew.
+  /// Writes the file again and returns its name.
   std::filesystem::path write(const std::string& name, const std::uint8_t* data, std::size_t size) const {
     const std::filesystem::path file = path_ / name;
     std::ofstream(file, std::ios::binary | std::ios::trunc)

@@ -16,7 +16,7 @@ void read(const kbvh::fuzz::InputFolder& folder, std::string_view bytes) {
 
 }  // namespace
 
-// The input as a file, and as the payload of one whose header is right: no random change gets past a
+// Reads the input as a file, and as the payload of a file with a correct header: no random change passes a
 // checksum.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const kbvh::fuzz::InputFolder folder;

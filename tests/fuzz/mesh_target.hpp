@@ -1,5 +1,5 @@
 #pragma once
-// A target that reads its input as a mesh file: whatever the bytes, there is a valid mesh or an InputError.
+// A target that reads its input as a mesh file: any bytes give a valid mesh or an InputError.
 
 #include <optional>
 #include <string>
@@ -11,8 +11,8 @@
 
 namespace kbvh::fuzz {
 
-/// Reads the file, and then what the reader promises: another `finish` finds nothing to complain about.
-/// Returns nothing if the file was refused.
+/// Reads the file, and checks the reader's promise: another `finish` finds nothing to correct. Returns
+/// nothing if the file was refused.
 inline std::optional<io::AnimatedMesh> read_mesh(const std::filesystem::path& mesh,
                                                  const std::filesystem::path& motion = {}) {
   io::AnimatedMesh read;
@@ -25,8 +25,8 @@ inline std::optional<io::AnimatedMesh> read_mesh(const std::filesystem::path& me
   return read;
 }
 
-/// Reads a text as a file of that name, and again with the line ends of Windows and of old Macs, and aborts
-/// if the mesh is another one. Texts with a '\r' of their own are read once.
+/// Reads a text as a file of that name, and again with the line ends of Windows and of old Macs; aborts if
+/// the mesh differs. Texts that already contain '\r' are read once.
 inline void read_text_mesh(const InputFolder& folder, const std::string& name, std::string_view text) {
   const auto read = [&](std::string_view bytes) {
     return read_mesh(folder.write(name, reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()));

@@ -2,7 +2,7 @@
 
 #include "tests/fuzz/input_file.hpp"
 
-// A plan file: read, and its contestants made out; no scene is loaded.
+// A plan file is read, and its contestants are expanded; no scene is loaded.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace kbvh;
   static const fuzz::InputFolder folder;

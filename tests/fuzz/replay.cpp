@@ -1,4 +1,4 @@
-// Calls a fuzz target with files, without libFuzzer: inputs that once broke something are tests in every
+// Calls a fuzz target with files, without libFuzzer: inputs that once caused a failure are tests in every
 // build.
 
 #include <cstdio>

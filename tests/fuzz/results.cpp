@@ -2,8 +2,8 @@
 
 #include "tests/fuzz/input_file.hpp"
 
-// A result file of whatever bytes, and a record added to it: the new record is found again, and what could be
-// read before still can.
+// Adds a record to a result file of arbitrary bytes: the new record is found again, and everything that was
+// readable before still is.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using kbvh::experiments::ResultStore;
   static const kbvh::fuzz::InputFolder folder;

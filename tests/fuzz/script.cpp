@@ -3,8 +3,8 @@
 #include "experiments/scenes/scene_spec.hpp"
 #include "tests/fuzz/input_file.hpp"
 
-// A script of plan changes: read, tried out on a small scene, and held against the admissible range until its
-// last frame.
+// A script of plan changes is read, tried out on a small scene, and checked against the admissible range
+// until its last frame.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace kbvh;
   using namespace kbvh::experiments;

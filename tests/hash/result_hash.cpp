@@ -1,7 +1,6 @@
-// Prints a hash of everything that this program's own strategies answer on the synthetic scenes: positions,
-// pairs, boxes. Answers are promised to be the same to the last bit whatever compiles and runs them: the sets
-// of kernels and the numbers of threads are compared here, compilers and flags by comparing what this prints
-// (compare).
+// Prints a hash of all answers of this program's own strategies on the synthetic scenes: positions, pairs,
+// boxes. Answers must be the same to the last bit for all compilers and machines: the sets of kernels and the
+// numbers of threads are compared here, compilers and flags by comparing the output (compare).
 
 #include <algorithm>
 #include <cinttypes>
@@ -22,7 +21,7 @@ namespace kbvh::test {
 namespace {
 
 #if defined(KBVH_TEST_HAS_TBB)
-// Four threads on machines with fewer cores, too; before the registry states its parameters.
+// Allows four threads on machines with fewer cores, too; set before the registry states its parameters.
 const tbb::global_control four(tbb::global_control::max_allowed_parallelism, 4);
 #endif
 
@@ -46,7 +45,7 @@ void add_frame(Session<S>& session, Hasher& hasher) {
     if (!view) continue;
     for (std::size_t node = 0; node < view->boxes.size(); ++node) {
       if (!view->stale.empty() && view->stale[node]) continue;
-      // Zeros of either sign are one number.
+      // Zeros of either sign count as the same number.
       for (int axis = 0; axis < 3; ++axis)
         for (const double bound : {view->boxes[node].lower[axis] + 0.0, view->boxes[node].upper[axis] + 0.0})
           hasher.bytes(&bound, sizeof bound);
@@ -114,7 +113,7 @@ int run() {
                                         "plan_changes"};
   bool same = true;
   for (const StrategyEntry& entry : registry()) {
-    // Peers' own hierarchies are theirs; the all-pairs contestants have none.
+    // Peers have their own hierarchies; the all-pairs contestants have none.
     if (entry.info.topology.own || entry.info.guarantee == Guarantee::approximate) continue;
     same &= print<float>(entry, scenes, "float");
     same &= print<double>(entry, scenes, "double");

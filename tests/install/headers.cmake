@@ -1,5 +1,5 @@
-# Compiles the headers of core on their own. Where headers include others than when the build was configured, the chains of
-# header_chains.py may not hold, and it is configured again.
+# Compiles the headers of core on their own. If their includes have changed since the build was configured, the chains of
+# header_chains.py may be out of date, and it is configured again.
 execute_process(COMMAND /usr/bin/python3 ${CMAKE_CURRENT_LIST_DIR}/header_chains.py ${SOURCE_DIR} ${FOLDERS}
   OUTPUT_VARIABLE now COMMAND_ERROR_IS_FATAL ANY)
 file(READ ${CHAINS} configured)

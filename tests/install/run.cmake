@@ -1,5 +1,5 @@
-# Installs the build into a prefix of its own, then goes through what a user with a strategy of his own does:
-# configure, build, ctest, list, bench. The first thing that is not as promised ends it.
+# Installs the build into a prefix of its own, then takes the steps of a user with a strategy of their own:
+# configure, build, ctest, list, bench. The first broken promise ends it.
 cmake_minimum_required(VERSION 3.25)
 
 set(prefix ${WORK_DIR}/prefix)
@@ -47,7 +47,7 @@ foreach(file IN LISTS package_files)
   endforeach()
 endforeach()
 
-# The strategies that the tutorial shows are the consumer's, as they stand there.
+# The strategies that the tutorial shows are word for word the consumer's.
 file(READ ${SOURCE_DIR}/analysis/site/pages/tutorial.md rest)
 set(shown)
 while(rest MATCHES "\n```cpp\n")

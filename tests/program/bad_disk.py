@@ -58,7 +58,7 @@ def require(condition: bool, what: str, run: subprocess.CompletedProcess[str] | 
 
 
 def results(out: Path) -> dict[str, Any]:
-    """What each record says but times; half lines are left out."""
+    """The content of each record except times; half lines are left out."""
     file = out / "results.jsonl"
     found = {}
     for line in file.read_text().split("\n") if file.exists() else []:
@@ -76,7 +76,7 @@ def sentences(run: subprocess.CompletedProcess[str], word: str) -> list[str]:
 
 
 def damages(content: bytes) -> dict[str, bytes]:
-    """What may become of a file."""
+    """The damaged forms of a file."""
     middle = len(content) // 2
     return {
         "empty": b"",
@@ -126,7 +126,7 @@ def no_cache(disk: Disk, scene: str) -> None:
 
 
 def no_results(disk: Disk, scene: str) -> None:
-    """Results that can go nowhere: an error at once, in one sentence."""
+    """Results that cannot be written anywhere: an error at once, in one sentence."""
     file = disk.folder / "file"
     file.write_text("not a folder")
     occupied = disk.fresh("occupied")
@@ -142,7 +142,7 @@ def no_results(disk: Disk, scene: str) -> None:
 
 
 def full_disk(disk: Disk, scene: str) -> None:
-    """Full at any size: code 2 and a sentence, or all is there; what is there is right, and the study can go on."""
+    """Full at any size: code 2 and a sentence, or everything is written; what is written is right, and the study can continue."""
     truth_out, cache = disk.fresh("truth"), disk.fresh("cache")
     require(disk.run(scene, truth_out, cache).returncode == 0, f"{scene}: the first run failed")
     truth = results(truth_out)

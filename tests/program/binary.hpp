@@ -11,13 +11,13 @@
 
 #include "temporary_folder.hpp"
 
-// The kbvh binary for tests, run as a shell runs it.
+// The kbvh binary for tests, run like from a shell.
 
 namespace kbvh::experiments {
 
 using nlohmann::json;
 
-/// One folder for all runs of a test; the cache is inside of it.
+/// One folder for all runs of a test, with the cache inside.
 class Binary : public testing::Test {
  protected:
   struct Outcome {
@@ -28,7 +28,7 @@ class Binary : public testing::Test {
                const std::string& program = KBVH_PROGRAM) {
     return shell(environment + " '" + program + "' " + arguments);
   }
-  /// A command of the shell, in the folder.
+  /// Runs a shell command in the folder.
   Outcome shell(const std::string& line) {
     const auto out = folder_ / "stdout", err = folder_ / "stderr";
     const std::string command = "cd '" + folder_.path().string() + "' && export KBVH_CACHE='" +

@@ -1,4 +1,4 @@
-// The kbvh binary as a shell sees it: exit codes, and what goes where.
+// The kbvh binary from a shell's point of view: exit codes, and which output goes where.
 #include "binary.hpp"
 #include "core/contract/registry.hpp"
 
@@ -64,7 +64,7 @@ TEST_F(Binary, WrongUseIsCodeTwoAndOneSentence) {
 
 TEST_F(Binary, DecidesQueriesOfContinuousCollision) {
   std::filesystem::create_directories(folder_ / "vertex-face");
-  // A vertex falls through a face from 1 to -1, and beside it.
+  // One vertex falls through a face, from 1 to -1, and another one next to it.
   std::string text;
   for (const bool hits : {true, false}) {
     const std::string x = hits ? "1,4" : "5,4", verdict = hits ? ",1\n" : ",0\n";
@@ -79,7 +79,7 @@ TEST_F(Binary, DecidesQueriesOfContinuousCollision) {
   ASSERT_EQ(all.at("files").size(), 1u);
   EXPECT_EQ(all.at("files")[0].at("queries"), 2);
   EXPECT_EQ(all.at("files")[0].at("positives"), 1);
-  // A verdict that is not so is found out.
+  // A wrong verdict is detected.
   text.replace(text.find(",1\n"), 3, ",0\n");
   for (std::size_t at = 0; (at = text.find(",1\n", at)) != std::string::npos;) text.replace(at, 3, ",0\n");
   write_text(folder_ / "vertex-face" / "data.csv", text);

@@ -1,5 +1,5 @@
-// The program with a list of strategies of its own, as a project out of the tree links it: one honest
-// strategy and some that fail, to see that the program refuses them a time and says so.
+// The program with its own list of strategies, as an external project links it: one correct strategy and some
+// faulty ones, to check that the program refuses them a time and reports it.
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
@@ -33,7 +33,7 @@ void work() {
   }
 }
 
-/// Every pair of primitives is a candidate, but for the fault.
+/// Every pair of primitives is a candidate, except for the fault.
 template <class S, Fault fault>
 class EveryPair : public Strategy<S> {
  public:
@@ -74,12 +74,12 @@ class EveryPair : public Strategy<S> {
   std::size_t bytes() const override { return 0; }
 
  protected:
-  /// A timed instance plays several times, others once.
+  /// A timed instance plays several times, other instances once.
   bool is_timed() const { return plays_ > 1; }
 
  private:
-  /// How often it can advance before there is no memory left; below 0 there is none to throw, either, and it
-  /// terminates the program as Embree can.
+  /// The number of advances before memory runs out. Below 0 there is none left to throw either, and the
+  /// strategy terminates the program, as Embree can.
   static int memory_for() { return number_of("KBVH_TEST_MEMORY", 0); }
   static int number_of(const char* variable, int otherwise) {
     const char* said = std::getenv(variable);
@@ -89,7 +89,7 @@ class EveryPair : public Strategy<S> {
   int frame_ = 0, confirmed_ = -2;  ///< the current frame, and the last one whose pairs were confirmed
 };
 
-/// Answers other questions, too: no ray hits anything, and every pair may touch.
+/// Answers the other queries, too: no ray hits anything, and every pair may touch.
 template <class S, Fault fault>
 class EveryAnswer : public EveryPair<S, fault>, public AnswersRays<S>, public AnswersSweeps<S> {
  public:

@@ -1,4 +1,4 @@
-// What a user gives a name, and what was meant by a word that names nothing.
+// Names given by a user, and suggestions for unknown words.
 #include "binary.hpp"
 #include "experiments/common/json_reader.hpp"
 #include "experiments/common/names.hpp"
@@ -27,7 +27,7 @@ TEST(Names, AreTextOfOneLine) {
        {std::string("a\nb"), std::string("a\0b", 3), std::string("\x1B[31m"), std::string("a\x7F")})
     EXPECT_NE(name_error(name).find("control character"), std::string::npos) << name;
   EXPECT_NE(name_error(std::string(1001, 'x')).find("1001 bytes"), std::string::npos);
-  // Longer than need be, halves of UTF-16 pairs, beyond the last code point, cut off.
+  // Overlong sequences, halves of UTF-16 pairs, values beyond the last code point, truncated sequences.
   for (const char* name : {"\xC0\xAF", "\xE0\x80\xAF", "\xED\xA0\x80", "\xF4\x90\x80\x80", "\xC3", "\xFF"})
     EXPECT_NE(name_error(name).find("not UTF-8"), std::string::npos);
 }
@@ -39,7 +39,7 @@ TEST(Names, AreSpeltOutWhereTheyAreNoText) {
   EXPECT_EQ(readable("two\nlines\x7F"), "two\\x0Alines\\x7F");
 }
 
-/// A name of a file that is an entry of its folder on every system.
+/// Expects a file name that is an entry of its folder on every system.
 void expect_file_name(const std::string& name) {
   const std::string file = file_name(name);
   EXPECT_FALSE(file.empty());
@@ -95,7 +95,7 @@ TEST_F(Binary, ScenesOfAnyNameAreStoredWhereTheyBelong) {
   const Outcome many = kbvh("run " + bodies + two);
   EXPECT_EQ(many.code, 0) << many.err;
   const std::string one = "--body sphere:triangles=20,keyframes=2,step=0.1:0:0 --body sphere:triangles=20 ";
-  int l = 2;  // another configuration each time: names do not make one
+  int l = 2;  // a different configuration each time: names do not distinguish them
   for (const std::string& name :
        {std::string(300, 'n'), std::string("a/b"), std::string("../../x"), std::string("CON")}) {
     const Outcome run = kbvh("run " + one + two + "--name '" + name + "' --l " + std::to_string(++l));
@@ -108,7 +108,7 @@ TEST_F(Binary, ScenesOfAnyNameAreStoredWhereTheyBelong) {
     EXPECT_NE(run.err.find("name: the name"), std::string::npos) << run.err;
   }
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_ / "o"), {}), 1);
-  // A file may be called what the system allows.
+  // A file may have any name that the system allows.
   write_text(folder_ / "caf\xE9.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   const Outcome latin =
       kbvh("run --body sphere:triangles=20,keyframes=2,step=0.1:0:0 --body caf\xE9.obj " + two);

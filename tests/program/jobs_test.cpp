@@ -1,4 +1,4 @@
-// A plan in jobs: what is listed, and that each job measures its part of the plan and nothing else.
+// A plan cut into jobs: the list, and that each job measures its part of the plan and nothing else.
 #include <algorithm>
 #include <map>
 #include <set>
@@ -104,7 +104,8 @@ TEST(Jobs, ThreadsAndMissingFiles) {
   EXPECT_NE(notes[0].find("'gone' is skipped"), std::string::npos) << notes[0];
 }
 
-/// The records of all files of a folder, by key, without times and what depends on the invocation.
+/// Returns the records of all files of a folder, by key, without times and members that depend on the
+/// invocation.
 std::map<std::string, json> records_below(const std::filesystem::path& folder) {
   std::map<std::string, json> found;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {

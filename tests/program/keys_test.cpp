@@ -1,5 +1,5 @@
-// Everything that decides a result is in the key that it is known by: every field of a plan, a scene, a
-// script and the parameters is altered in turn, and another key is expected.
+// The key of a result contains everything that affects it: every field of a plan, a scene, a script and the
+// parameters is altered in turn, and a different key is expected.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -23,7 +23,7 @@ using nlohmann::json;
 const json here{
     {"cpu", "c"}, {"compiler", "g"}, {"flags", "-O2"}, {"build_type", "Release"}, {"kernels", "sse"}};
 
-/// The keys of one table, made as a study makes them.
+/// Returns the keys of one table, made as a study makes them.
 template <class S>
 void add_keys(const Study& study, const LoadedScene& loaded, const json& machine,
               std::set<std::string>& keys) {
@@ -56,7 +56,8 @@ std::set<std::string> keys_of(const json& value, const std::filesystem::path& fo
   return keys;
 }
 
-/// Another value of the same kind that a plan may hold; null: there is none, or it decides nothing.
+/// Returns another value of the same kind that a plan may hold; null if there is none, or if it has no
+/// effect.
 json other(const std::string& key, const json& value) {
   static const std::set<std::string> free{"name",  "description", "optional", "id",
                                           "shape", "builtin",     "file",     "motion"};
@@ -72,7 +73,7 @@ json other(const std::string& key, const json& value) {
   return value.get<double>() + 0.001;
 }
 
-/// Alters every leaf in turn, and asks for other keys.
+/// Alters every leaf in turn, and expects different keys.
 void expect_every_field_counts(const json& plan, const std::filesystem::path& folder = {}) {
   const std::set<std::string> usual = keys_of(plan, folder);
   ASSERT_FALSE(usual.empty());

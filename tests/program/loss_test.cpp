@@ -1,5 +1,5 @@
-// Nothing that was measured or found is lost: out of memory, full disks, damaged and shared files, runs that
-// are ended.
+// No measurement and no finding is lost: memory that runs out, full disks, damaged and shared files,
+// interrupted runs.
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -23,7 +23,7 @@ namespace {
 const std::string one = tiny + "--strategies bottom_up ";
 
 TEST_F(Binary, OutOfMemoryIsNoBrokenGuaranteeAndIsMeasuredAgain) {
-  // At the first frame, while it is verified; and when it is played, after it has held.
+  // At the first frame, during verification; and during the timed clip, after the guarantee has held.
   for (const std::string memory : {"0", "4"})
     for (const std::string command : {"run "}) {
       SCOPED_TRACE(command + memory);
@@ -65,11 +65,11 @@ TEST_F(Binary, AContestantThatTerminatesTheProgramIsNamed) {
   EXPECT_EQ(kbvh("run " + tiny + "--strategies honest --out out", "", KBVH_FAULTY_PROGRAM).code, 0);
 }
 
-// An assertion of a library ends the program: what was measured before is kept, the next run goes on without
-// it.
+// An assertion in a library ends the program: earlier measurements are kept, and the next run continues
+// without the contestant.
 TEST_F(Binary, AContestantThatAbortsIsReportedAndLeftOut) {
   ASSERT_EQ(kbvh("run " + tiny + "--strategies honest --seed 2 --out out", "", KBVH_FAULTY_PROGRAM).code, 0);
-  // At the first frame, while it is verified; and when it is played, after it has held.
+  // At the first frame, during verification; and during the timed clip, after the guarantee has held.
   for (const auto& [advances, doing] : {std::pair{"0", "verifying"}, std::pair{"5", "timing"}})
     for (const std::string command : {"run ", "bench "}) {
       SCOPED_TRACE(command + doing);
@@ -103,14 +103,14 @@ TEST_F(Binary, AContestantThatAbortsIsReportedAndLeftOut) {
       for (const auto& entry : std::filesystem::directory_iterator(folder_ / out))
         EXPECT_NE(entry.path().extension(), ".measuring") << entry.path();
     }
-  // Without a folder, the program says at least what it was doing.
+  // Without a folder, the program at least reports what it was doing.
   const Outcome alone =
       kbvh("run " + tiny + "--strategies honest,aborts", "KBVH_TEST_ABORT=0", KBVH_FAULTY_PROGRAM);
   EXPECT_EQ(alone.code, 128 + 6);
   EXPECT_NE(alone.err.find("while verifying aborts on waving_sheet"), std::string::npos) << alone.err;
 }
 
-// Want of memory is the usual reason: no verdict, and the others of the table are measured by the next run.
+// Lack of memory is the usual reason: no verdict, and the next run measures the others of the table.
 TEST_F(Binary, AContestantThatTerminatesTheProgramIsTriedOnceMoreAfterTheOthers) {
   const std::string arguments = "run " + tiny + "--strategies honest,needs_memory --out out";
   EXPECT_EQ(kbvh(arguments, "KBVH_TEST_MEMORY=-1", KBVH_FAULTY_PROGRAM).code, 3);
@@ -129,7 +129,7 @@ TEST_F(Binary, AContestantThatTerminatesTheProgramIsTriedOnceMoreAfterTheOthers)
   EXPECT_EQ(records("out/results.jsonl").size(), 3u);
 }
 
-// Wherever memory ends, that is no fault of a contestant.
+// Running out of memory is never a contestant's fault, at any point.
 TEST_F(Binary, WantOfMemoryIsNeverABrokenGuarantee) {
   if (known_strategy("embree_refit") == nullptr) GTEST_SKIP() << "built without Embree";
   for (const std::string kilobytes : {"120000", "180000", "200000", "250000"}) {
@@ -236,7 +236,7 @@ TEST_F(Binary, EveryFieldThatIsTakenOutIsNoticedOrNotNeeded) {
         const json kept = member;
         member = other;
         ++taken_out;
-        // Whatever passes can be shown.
+        // Every record that passes can be shown.
         if (unusable(root).empty()) {
           EXPECT_NO_THROW(results_table({root})) << root.dump();
         }
@@ -251,7 +251,7 @@ TEST_F(Binary, EveryFieldThatIsTakenOutIsNoticedOrNotNeeded) {
 }
 
 TEST_F(Binary, TablesArePrintedWhereResultsCannotBeWritten) {
-  // A disk with room for the first record, and not for the fourth.
+  // A disk with space for the first record, but not for the fourth.
   ASSERT_EQ(kbvh("run " + one + "--out whole").code, 0);
   const auto size = std::filesystem::file_size(folder_ / "whole/results.jsonl");
   const std::string room =
@@ -281,7 +281,7 @@ TEST_F(Binary, FullDisksAndFoldersInTheWayAreNoticedBeforeAnythingIsMeasured) {
     EXPECT_NE(run.err.find(file), std::string::npos) << run.err;
     std::filesystem::remove_all(folder_ / "taken");
   }
-  // What was looked for leaves nothing behind.
+  // The check leaves nothing behind.
   EXPECT_EQ(kbvh("run " + one + "--out out").code, 0);
   std::set<std::string> names;
   for (const auto& entry : std::filesystem::directory_iterator(folder_ / "out"))
@@ -290,7 +290,7 @@ TEST_F(Binary, FullDisksAndFoldersInTheWayAreNoticedBeforeAnythingIsMeasured) {
 }
 
 TEST_F(Binary, AStressRunThatIsEndedLeavesWhatItFound) {
-  // Ended as soon as there is a failure and a table; the suite itself would go on for minutes.
+  // Interrupted as soon as there is a failure and a table; the suite itself would run for minutes.
   const Outcome ended =
       shell("'" KBVH_FAULTY_PROGRAM
             "' stress --strategies loses,honest --families unit,near_tangent,spikes "
@@ -345,7 +345,7 @@ TEST_F(Binary, ATableOfOtherOptionsIsRenamed) {
 }
 
 TEST_F(Binary, ATableSaysHowFarItHasCome) {
-  // Long before the first scene is done there is a table, of none.
+  // Long before the first scene is finished there is an empty table.
   const Outcome ended =
       shell("'" KBVH_PROGRAM
             "' stress --strategies bottom_up --families many_keyframes --scenes 1 --out out "
@@ -438,7 +438,7 @@ TEST_F(Binary, ScenesOfOneNameHaveCardsOfTheirOwn) {
   EXPECT_NE(second, first);
   EXPECT_EQ(card(first).at("bodies")[0].at("primitives"), 1);
   EXPECT_EQ(card(second).at("bodies")[0].at("primitives"), 2);
-  // A card that was damaged is made again.
+  // A damaged card is made again.
   write_text(folder_ / ("out/scenes/mine-" + first) / "card.json", "{");
   write_text(folder_ / ("out/scenes/mine-" + second) / "card.json", "");
   EXPECT_EQ(run("a.obj", "double"), second);
@@ -472,7 +472,7 @@ TEST_F(Binary, ScriptsThatDifferInTheirRateAreMeasuredBoth) {
 }
 
 TEST_F(Binary, NothingIsMeasuredTwiceInOneRun) {
-  // 50 and 51 triangles are the same sheet, which reading the numbers does not show.
+  // 50 and 51 triangles are the same sheet, which the numbers do not show.
   const std::string twice =
       "--scene waving_sheet --triangles 50,51,50 --obstacle 80 --keyframes 2 --l 2,2 --scalar float,float "
       "--repetitions 1 --strategies bottom_up,bottom_up ";

@@ -104,7 +104,7 @@ TEST_F(Merge, TheNewestFinishedRecordOfAKeyCounts) {
   ASSERT_EQ(kbvh("merge failed new old --out c").code, 0);
   EXPECT_EQ(runs("k1"), (std::vector<std::string>{"r3", "r1", "r2"}));
   EXPECT_EQ(runs("k2"), std::vector<std::string>{"r2"});
-  // What is in the folder already is repeated after older records, and only then.
+  // A record that the folder already has is repeated after older records, and only then.
   ASSERT_EQ(kbvh("merge new --out d").code, 0);
   ASSERT_EQ(kbvh("merge old --out d").code, 0);
   EXPECT_EQ(runs("k1", "d/results.jsonl"), (std::vector<std::string>{"r2", "r1", "r2"}));
@@ -189,7 +189,7 @@ TEST_F(Merge, AFullDiskLeavesTheResultsAsTheyWere) {
   std::vector<json> many;
   for (int i = 0; i < 200; ++i) many.push_back(record("m" + std::to_string(i), "r2", "2026-01-02T00:00:00Z"));
   write("b", many);
-  // A limit of the shell on the size of files, in blocks of 1,024 bytes, stands in for the disk.
+  // A shell limit on file sizes, in blocks of 1,024 bytes, stands in for the disk.
   const Outcome outcome = shell("ulimit -f 40; trap '' XFSZ; '" KBVH_PROGRAM "' merge b --out a");
   EXPECT_NE(outcome.code, 0);
   EXPECT_NE(outcome.err.find("cannot be written"), std::string::npos) << outcome.err;

@@ -1,5 +1,4 @@
-// Options of every subcommand: what is wrong is refused in one sentence, and nothing that is printed gets
-// lost.
+// Options of every subcommand: wrong ones are refused in one sentence, and no printed output gets lost.
 #include <cstdlib>
 #include <map>
 #include <sstream>
@@ -11,18 +10,18 @@
 namespace kbvh::experiments::options_test {
 namespace {
 
-/// What an option takes, and so what it must refuse.
+/// The values that an option takes, and those that it must refuse.
 enum class Kind {
   number,  ///< whole numbers, lists of them, or a time: all nonsense
   names,   ///< words or files that must exist: all nonsense
-  free,    ///< a folder or name of the user's own: only empty values, forgotten ones, repeated ones
-  several  ///< of these any number is right: only empty and forgotten ones
+  free,    ///< any folder or name: only empty, forgotten and repeated values
+  several  ///< may be repeated: only empty and forgotten values
 };
 
 struct Option {
   std::string name;
   Kind kind;
-  std::string right;  ///< a value that is fine
+  std::string right;  ///< a valid value
 };
 
 const std::vector<Option> study_options{{"--scene", Kind::names, "turning_box"},
@@ -54,7 +53,7 @@ const std::vector<Option> study_options{{"--scene", Kind::names, "turning_box"},
                                         {"--plan", Kind::names, "plan.json"},
                                         {"--study", Kind::several, "small"}};
 
-/// `run` has more: what an engine for many machines calls.
+/// The additional options of `run`, for engines that use many machines.
 std::vector<Option> run_options() {
   std::vector<Option> options = study_options;
   options.push_back({"--job", Kind::free, "job"});
@@ -121,7 +120,7 @@ const std::vector<std::string> nonsense{"-1",
                                         std::string(1000, '9'),
                                         std::string(1000, 'x')};
 
-/// The program inside of this process, in a folder of its own: a thousand starts of the binary would take
+/// Runs the program inside of this process, in its own folder: a thousand starts of the binary would take
 /// minutes.
 class Options : public Binary {
  protected:
@@ -156,14 +155,14 @@ class Options : public Binary {
     EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1) << command << "\n" << said;
     EXPECT_EQ(said.find('\x1b'), std::string::npos) << command;
     EXPECT_EQ(said.find("internal error"), std::string::npos) << command << "\n" << said;
-    // Nonsense that would be cut or replaced is looked for by its second character.
+    // Values that would be shortened or replaced are searched by their second character.
     const bool plain = value.size() < 30 && value.find_first_of("\x1b\n\xc3") == std::string::npos;
     const bool named = said.find(plain ? value : value.substr(1, 1)) != std::string::npos;
     EXPECT_TRUE(named || said.find(R"('?)") != std::string::npos) << command << "\n" << said;
     std::string key = option.substr(option.find_first_not_of('-'));
     for (char& c : key) c = c == '-' ? '_' : c;
     if (key == "body" || key == "param" || key == "repro" || key == "plan" || key == "strategies") return;
-    // Keys of plans are singular or plural as they like.
+    // Keys of plans may be singular or plural.
     if (key.size() > 4 && key.ends_with("ies")) key.resize(key.size() - 3);
     if (key.size() > 2 && key.ends_with("s")) key.resize(key.size() - 1);
     std::string text = said;
@@ -211,7 +210,7 @@ TEST_F(Options, NonsenseIsRefusedInOneSentence) {
       refused(with({option.name, ""}), option.name, "empty");
       refused(with({option.name + "="}), option.name, "empty");
       refused(with({option.name, "--help-me"}), option.name, "--help-me");
-      // Of lists, all occurrences count.
+      // In lists, all occurrences count.
       const bool list = help.find(option.name + " TEXT ...") != std::string::npos ||
                         help.find(option.name + " UINT ...") != std::string::npos;
       if (!list && option.kind != Kind::several && option.name != "--param")
@@ -249,7 +248,7 @@ TEST_F(Options, NumbersAreReadStrictly) {
     EXPECT_EQ(outcome.err, "kbvh: " + message + "\n");
   }
   EXPECT_TRUE(std::filesystem::is_empty(folder_.path()));
-  // Decimal, whatever it begins with, and up to the largest.
+  // Decimal, regardless of leading zeros, and up to the largest.
   const Outcome right =
       called({"run", "--print-plan", "--l", "010,2,10", "--l=3", "--seed", "18446744073709551615"});
   ASSERT_EQ(right.code, 0) << right.err;
@@ -343,7 +342,7 @@ const std::string clips = "--scene waving_sheet --triangles 100 --keyframes 3 --
 
 class StandardOutput : public Binary {
  protected:
-  /// Runs the program with its standard output somewhere else.
+  /// Runs the program with redirected standard output.
   Outcome to(const std::string& redirection, const std::string& arguments) {
     const std::string command = "cd '" + folder_.path().string() +
                                 "' && ( KBVH_CACHE=cache '" KBVH_PROGRAM "' " + arguments +
@@ -358,7 +357,7 @@ TEST_F(StandardOutput, AFullDiskIsNoticed) {
   write_text(folder_ / "vertex-face" / "data.csv",
              "1,4,1,4,1,1\n0,1,0,1,0,1\n1,1,0,1,0,1\n0,1,1,1,0,1\n"
              "1,4,1,4,-1,1\n0,1,0,1,0,1\n1,1,0,1,0,1\n0,1,1,1,0,1\n");
-  // Shapes have a least number of triangles, so these sizes are one scene, whose growth cannot be fitted.
+  // Shapes have a minimum number of triangles, so these sizes are one scene, whose growth cannot be fitted.
   const std::string small_theory =
       "theory --scenes turning_box,expanding_sphere --sizes 2,3,4,5,6,7 --keyframes 2";
   const std::string cases[] = {"--help",
@@ -434,7 +433,7 @@ TEST_F(Binary, AStatedRangeIsKeptAndListed) {
   const Outcome later = run("--body sphere:triangles=20,keyframes=3,step=60:0:0,name=ball");
   EXPECT_NE(later.err.find("of body 'ball' is at x = "), std::string::npos) << later.err;
   EXPECT_NE(later.err.find(" at keyframe 2\n"), std::string::npos) << later.err;
-  // By a change of plans, for which a peer stands.
+  // By a change of plans, represented by a peer.
   if (known_strategy("fcl_float_own_verdict") != nullptr) {
     const auto with_script = [&](const std::string& velocity) {
       write_text(folder_ / "s.json",

@@ -63,7 +63,7 @@ TEST(Output, IsReceivedInsteadOfPrinted) {
   EXPECT_EQ(testing::internal::GetCapturedStdout(), "before after");
 }
 
-// The identity of changed code is that of the file that holds it: this program, whatever runs it.
+// The identity of changed code is that of the file that contains it: this program, whichever program runs it.
 TEST(Machine, IdentityNamesTheCommit) {
   EXPECT_EQ(program_identity().rfind(commit(), 0), 0u);
   EXPECT_EQ(program_identity() == commit(), !dirty() && commit() != "unknown");

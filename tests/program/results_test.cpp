@@ -100,12 +100,12 @@ TEST(Results, KeysAreStableAndSeeWhatMatters) {
     return configuration_key("abc", scene, strategy, study, example_machine);
   };
   const std::string usual = key(example_scene(), example_strategy());
-  // Pinned: a change of this value makes every stored result be measured again.
+  // Pinned: if this value changes, every stored result is measured again.
   EXPECT_EQ(usual, "2416c175ab5b7e21");
   json scene = example_scene(), strategy = example_strategy();
   strategy["title"] = "another title";
   EXPECT_EQ(key(scene, strategy), usual);
-  // A table and a report are of scenes by name: what was measured under another one is not in them.
+  // A table and a report show scenes by name: measurements under another name are not included.
   scene["name"] = "another name";
   EXPECT_NE(key(scene, example_strategy()), usual);
   scene = example_scene();
@@ -178,7 +178,7 @@ TEST(Times, MeansHaveEveryPhase) {
   EXPECT_DOUBLE_EQ(parts[1].at("query"), 11e3);
 }
 
-/// A clip of four frames, of which each takes as long as it says, update and query alike.
+/// A clip of frames of the given lengths, the same for update and query.
 ClipTimes clip_of(const std::vector<double>& frames, double motion = 1) {
   ClipTimes clip;
   for (const double frame : frames) clip.frames.push_back({1e-3 * motion, 5e-4 * frame, 5e-4 * frame, 0});
@@ -202,7 +202,7 @@ TEST(Times, ADisturbedFrameDoesNotCount) {
   RawTimes by_clips = times;
   by_clips.by = By::clips;
   EXPECT_DOUBLE_EQ(time_of(by_clips, "total"), 82.0 / 4) << "the median clip: 16, 104, 82, 16 or 160";
-  // The same from the record, whose numbers are rounded.
+  // The same from the record, in which numbers are rounded.
   const json record{{"run", "s"}, {"scene", {{"frames", 4}}}, {"times", times_record(measured)}};
   EXPECT_EQ(unusable(json{{"times", times_record(measured)}}).find("times."), std::string::npos);
   EXPECT_DOUBLE_EQ(time_of(record, "total"), 4);
@@ -210,7 +210,7 @@ TEST(Times, ADisturbedFrameDoesNotCount) {
   EXPECT_EQ(record.at("times").at("repetitions")[4].at("steady").at("update"), 15);
 }
 
-// One side by clips: both are.
+// If one side is counted by clips, both are.
 TEST(Times, RatiosCountBothSidesTheSameWay) {
   Measured one, two;
   for (const double last : {2.0, 2.0, 30.0, 30.0, 30.0}) one.repetitions.push_back(clip_of({2, last}));
@@ -264,7 +264,7 @@ TEST(Rounds, AreShuffledBySeed) {
     EXPECT_EQ(order, (std::vector<std::size_t>{0, 1, 2, 3, 4, 5}));
   }
   EXPECT_GT(orders.size(), 15u);
-  // Pinned: another order is another measurement.
+  // Pinned: a different order is a different measurement.
   EXPECT_EQ(shuffled(6, 7, 0), (std::vector<std::size_t>{3, 4, 2, 0, 1, 5}));
 }
 

@@ -1,4 +1,4 @@
-// Scripts of plan changes: what a user may write, what is refused and how, and a study that replays one.
+// Scripts of plan changes: what a user may write, what is refused and how, and a study that replays a script.
 #include <gtest/gtest.h>
 
 #include "complaint.hpp"
@@ -44,7 +44,7 @@ TEST(Scripts, AreReadAndTriedOut) {
   EXPECT_EQ(knots.positions, (std::vector<float>{1, 0, 0, 0, 1, 0}));
   EXPECT_EQ(script.changes_until(0), 1u);
   EXPECT_EQ(script.changes_until(1), 3u);
-  // Every time of the script is a frame, between those that l says.
+  // Every time of the script is a frame, in addition to those given by l.
   const auto frames = frames_of(scene, loaded, script, 1);
   EXPECT_EQ(frames.size(), 5u);
   EXPECT_TRUE(std::find(frames.begin(), frames.end(), 0.05) != frames.end());
@@ -158,7 +158,7 @@ TEST(Scripts, AreReplayedToThoseWhoCanTakeThem) {
     double changes = 0;
     for (const PhaseTimes& frame : measurement[i].repetitions[1].frames) changes += frame.plan_changes;
     EXPECT_GT(changes, 0);
-    // The driver's own part of a change is motion: nobody else evaluates positions while a script is
+    // The driver's own part of a change counts as motion: nothing else evaluates positions while a script is
     // followed.
     Session<float> session(scene, spec.contestant());
     session.reset(frames[0]);

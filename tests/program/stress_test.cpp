@@ -1,5 +1,5 @@
-// The stress suite: its scenes, that it finds seeded faults and makes them small, that nothing takes it
-// along, and what the approximate contestants show in it.
+// The stress suite: its scenes, that it finds seeded faults and shrinks them, that no failure ends it, and
+// the results of the approximate contestants in it.
 
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ namespace {
 
 enum class Fault { none, one_ulp, hangs, crashes, throws };
 
-/// A refit with one fault, where there are keyframes beyond the first.
+/// A refit with one fault, which needs more than one keyframe.
 template <class S, Fault fault>
 class FaultyRefit : public StoredHierarchyStrategy<S> {
   using Base = StoredHierarchyStrategy<S>;
@@ -55,7 +55,7 @@ using Crashes = FaultyRefit<S, Fault::crashes>;
 template <class S>
 using Throws = FaultyRefit<S, Fault::throws>;
 
-/// Some events never get into the queue.
+/// Some events never enter the queue.
 template <class S>
 class LossyQueue : public AvlQueue<S> {
  public:
@@ -172,7 +172,7 @@ void expect_found_and_small(const StrategyEntry& faulty, std::vector<std::string
     EXPECT_EQ(failure.repro.strategy, faulty.info.id);
     EXPECT_LT(failure.repro.scene.size(), failure.size_before);
     EXPECT_LE(failure.repro.scene.triangles(), largest) << to_text(failure.repro);
-    // What is written to the file fails as well.
+    // The scene read back from the file fails as well.
     const Repro back = repro_of(to_text(failure.repro), "text");
     EXPECT_EQ(run_scene(back.scene, back.scalar, {contestant(faulty)}, options.limits)[0].outcome,
               Outcome::broken);
@@ -232,7 +232,7 @@ TEST(Isolation, AnswersComeBackInOrderWhateverHappensBetween) {
 TEST(Shrinking, LeavesWhatIsNeededAndNothingElse) {
   FamilySetting setting{5, 7, scalar_limits<double>(), 300};
   const StressScene scene = make_scene(find_family("changes_at_keyframes"), setting);
-  // Something that needs one vertex of a triangle beyond 0.5 at the second keyframe, and one frame behind it.
+  // Requires one vertex of a triangle beyond 0.5 at the second keyframe, and a later frame.
   std::size_t asked = 0;
   const auto fails = [&](const StressScene& candidate) {
     ++asked;
@@ -251,7 +251,7 @@ TEST(Shrinking, LeavesWhatIsNeededAndNothingElse) {
   EXPECT_EQ(small.frames.size(), 1u);
   EXPECT_TRUE(small.steps.empty());
   EXPECT_EQ(small.keyframes(), 2u);
-  // The one coordinate is a round number, and all others are gone.
+  // The only remaining coordinate is a round number.
   std::size_t others = 0;
   for (const double x : small.bodies[0].positions) others += x != 0;
   EXPECT_EQ(others, 1u);
@@ -268,7 +268,7 @@ TEST(Repro, WhatFailedOnceHolds) {
     ContestantSpec spec = contestant(*known, repro.params);
     if (!repro.builder.empty()) spec.builder = builder_of(repro.builder);
     const CaseResult result = run_scene(repro.scene, repro.scalar, {spec}, {})[0];
-    // A peer may have a range of its own, which it states; it never ends the program.
+    // A peer may state a range of its own; it never ends the program.
     const bool stated = result.outcome == Outcome::unsuitable && std::isfinite(known->info.max_coordinate) &&
                         result.what.starts_with("takes coordinates up to");
     EXPECT_TRUE(result.outcome == Outcome::held || stated) << file.path() << ": " << result.what;

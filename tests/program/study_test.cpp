@@ -35,7 +35,7 @@ TEST_F(Binary, RunsRecordsAndResumes) {
   EXPECT_NE(second.err.find("already"), std::string::npos) << second.err;
   EXPECT_EQ(text_of_file(folder_ / "out/results.jsonl"), before);
   EXPECT_EQ(second.out, first.out);
-  // As if killed in the middle of the last record: that one alone is made again.
+  // Like a run killed in the middle of the last record: only that record is made again.
   write_text(folder_ / "out/results.jsonl", before.substr(0, before.size() - 20));
   const Outcome third = kbvh(run);
   EXPECT_EQ(third.code, 0);
@@ -74,7 +74,7 @@ TEST_F(Binary, ContactsBetweenKeyframesAreMeasuredAndKept) {
               impacts.at("filtered").get<int>() + impacts.at("exact").get<int>());
     EXPECT_GT(impacts.at("tests"), 0);
   }
-  // Not measured again; and frames are another thing.
+  // Not measured again; but frames are a different measurement.
   EXPECT_EQ(kbvh(command).code, 0);
   EXPECT_EQ(records().size(), found.size());
   EXPECT_EQ(kbvh("run " + tiny + "--strategies bottom_up --out out").code, 0);
@@ -99,7 +99,7 @@ TEST_F(Binary, ChangesAreMeasuredAndKept) {
       EXPECT_EQ(repetition.at("triangle_tests"), 0);
     }
   }
-  // Not measured again; other answers are another thing.
+  // Not measured again; but the other answer is a different measurement.
   EXPECT_EQ(kbvh(command + who + "--changes pairs").code, 0);
   EXPECT_EQ(records().size(), 4u);
   EXPECT_EQ(kbvh(command + who + "--changes candidates").code, 0);
@@ -128,7 +128,7 @@ TEST_F(Binary, ContactsAreMeasuredWherePlansChange) {
   }
 }
 
-// Intervals of contacts end at the keyframes of bodies, too, wherever the frames of a script lie.
+// Intervals of contacts also end at the keyframes of bodies, for any frames of a script.
 TEST_F(Binary, ContactsOfAScriptWithFramesOfItsOwn) {
   write_text(folder_ / "script.json",
              R"({"frames": 10, "rate": 7, "steps": [
@@ -163,7 +163,7 @@ TEST_F(Binary, ScenesOfThousandsOfBodiesAreNotWritten) {
 }
 
 TEST_F(Binary, PairsWithinBodiesAreCountedWhereTheyAreAskedFor) {
-  // Two squares of one body, as a tent of which each side goes through the other.
+  // Two squares of one body that form a tent in which each side passes through the other.
   write_text(folder_ / "tent.obj",
              "v 0 0 0\nv 1 0 1\nv 0 1 0\nv 1 0 0\nv 0 0 1\nv 1 1 0\nf 1 2 3\nf 4 5 6\n");
   const std::string bodies =
@@ -181,7 +181,7 @@ TEST_F(Binary, PairsWithinBodiesAreCountedWhereTheyAreAskedFor) {
   EXPECT_GT(with.at("verified").at("pairs"), 0);
   EXPECT_EQ(with.at("scene").at("bodies").at(0).at("self"), true);
   EXPECT_NE(with.at("key"), without.at("key"));
-  // Who cannot is left out.
+  // Strategies that cannot do this are left out.
   EXPECT_EQ(records("with/results.jsonl").size(), 1u);
   EXPECT_EQ(records("without/results.jsonl").size(), 2u);
   const json one = pairs("--body sphere:triangles=100,self=true ", "one");
@@ -239,7 +239,7 @@ TEST_F(Binary, NeighboursAtASeamAreNoPair) {
   for (const std::string file : {"cube.obj", "cube.ply"}) {
     EXPECT_EQ(pairs(file, "note: " + file + ": welded 16 vertices"), 0);
     EXPECT_GT(pairs(file + ",weld=false", "16 of its vertices"), 0);
-    // A script moves vertices by their numbers in the file, copies too.
+    // A script moves vertices by their numbers in the file, including copies.
     EXPECT_GT(pairs(file, "16 of its vertices", " --script script.json"), 0);
     EXPECT_EQ(pairs(file + ",weld=true", "welded 16 vertices", " --script script.json"), 0);
   }
@@ -276,8 +276,8 @@ double middle_of(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-/// The time of a phase by the medians of frames, of a record with an odd number of repetitions; "clip" is all
-/// of it.
+/// Returns the time of a phase by the medians of frames, for a record with an odd number of repetitions;
+/// "clip" sums all phases.
 double middle(const json& record, const std::string& phase) {
   const json& repetitions = record.at("times").at("repetitions");
   const auto medians = [&](const auto& number) {
@@ -339,7 +339,7 @@ TEST_F(Binary, TargetsFollowFromTheRecords) {
     const json rows = json::parse(text_of_file(folder_ / "out/targets.json"));
     ASSERT_TRUE(rows.is_array());
     ASSERT_EQ(rows.size(), 3u);
-    // The same, from the records; those of the last command are the last of each scene and label.
+    // The same from the records; those of the last command come last for each scene and label.
     std::map<std::string, std::map<std::string, json>> known;
     for (const json& record : records())
       known[record.at("scene").at("name")][record.at("strategy").at("label")] = record;
@@ -376,7 +376,7 @@ TEST_F(Binary, TargetsFollowFromTheRecords) {
       EXPECT_EQ(row.at("commit"), records()[0].at("commit"));
     }
   }
-  // Without a folder the table is all there is; a wrong target ends it before anything is measured.
+  // Without a folder there is only the table; a wrong target ends the run before any measurement.
   EXPECT_NE(kbvh("run --plan plan.json").out.find("Targets"), std::string::npos);
   json wrong = plan;
   wrong["targets"][0]["scenes"] = "nowhere";
@@ -423,7 +423,7 @@ TEST_F(Binary, StudiesOfAPlanCanBeRunOneByOne) {
   EXPECT_EQ(list[1].at("scene").at("per_keyframe"), 3);
   EXPECT_EQ(large.out.find("Targets"), std::string::npos);
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out/targets.json"));
-  // A study without a name has the plan's; what is there already is not measured again.
+  // A study without a name has the plan's; existing results are not measured again.
   const Outcome two = kbvh("run --plan plan.json --study whole --study large --out out");
   ASSERT_EQ(two.code, 0) << two.err;
   EXPECT_NE(two.err.find("2 configurations measured, 2 were in"), std::string::npos) << two.err;
@@ -489,12 +489,12 @@ TEST_F(Binary, BrokenGuaranteesAreRefusedATime) {
       EXPECT_TRUE(by_id.at(id).at("times").is_object()) << id;
     EXPECT_GT(by_id.at("admits_to_lose").at("verified").at("missed"), 0u);
     EXPECT_GT(by_id.at("repeats").at("verified").at("repeated"), 0u);
-    // Known failures still are failures when nothing is measured again.
+    // Known failures are still failures when nothing is measured again.
     EXPECT_EQ(kbvh(arguments, "", KBVH_FAULTY_PROGRAM).code, 1);
   }
 }
 
-// Work at the beginning of a clip counts, whether `reset` does it or the first answer.
+// Work at the beginning of a clip counts, whether `reset` or the first answer does it.
 TEST_F(Binary, TheBeginningOfAClipIsChargedFor) {
   const Outcome run =
       kbvh("run " + tiny + "--strategies honest,works_in_reset,works_in_first_query --out out", "",
@@ -511,7 +511,7 @@ TEST_F(Binary, TheBeginningOfAClipIsChargedFor) {
     for (const json& repetition : times.at("repetitions")) {
       SCOPED_TRACE(id);
       ASSERT_EQ(repetition.at("totals").size(), 5u);
-      // It works for 30 ms, which no other frame of 100 triangles takes.
+      // It works for 30 ms, which is longer than any other frame of 100 triangles.
       EXPECT_EQ(repetition.at("totals")[0].get<double>() > 25, works);
       EXPECT_EQ(repetition.at(id == "works_in_reset" ? "update" : "traversal").get<double>() > 5, works);
       EXPECT_EQ(repetition.at("reset").at("update").get<double>() > 25, id == "works_in_reset");
@@ -535,7 +535,7 @@ TEST_F(Binary, WhoAnswersOtherwiseWhileItIsTimedIsRefused) {
     EXPECT_TRUE(list[0].at("times").is_object()) << more;
     EXPECT_TRUE(list[1].at("times").is_null()) << more;
   }
-  // As `verify` queries: it answers all; with other calls in between, as they are timed, it does not.
+  // Queried as `verify` does, it answers everything; with other calls in between, as in timing, it does not.
   const Outcome run = kbvh("run " + tiny + "--strategies lazy_unless_judged --oracle-every 2 --out judged",
                            "", KBVH_FAULTY_PROGRAM);
   EXPECT_EQ(run.code, 1) << run.err;

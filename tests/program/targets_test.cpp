@@ -1,4 +1,4 @@
-// Targets of plans: what is refused before anything is measured, and what the rows say of given records.
+// Targets of plans: what is refused before any measurement, and the rows for given records.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -24,12 +24,12 @@ namespace {
 using nlohmann::json;
 
 #if defined(KBVH_TEST_HAS_TBB)
-// As many threads as shipped plans ask for, on machines with fewer cores, too; before the registry states its
-// parameters.
+// Allows as many threads as shipped plans request, even on machines with fewer cores; set before the registry
+// states its parameters.
 const tbb::global_control sixteen(tbb::global_control::max_allowed_parallelism, 16);
 #endif
 
-/// A plan with one target that is right: period over flat, on "sheet".
+/// A plan with one correct target: period over flat, on "sheet".
 json example_plan() {
   return json::parse(R"({
     "name": "example",
@@ -55,7 +55,7 @@ void check_targets(const Plan& plan) {
   check_target_contestants(plan, contestants);
 }
 
-/// What is said of the plan when the program starts.
+/// Returns the complaint about the plan when the program starts.
 std::string start_complaint(const json& value) {
   return complaint([&] { check_targets(read(value)); });
 }
@@ -92,9 +92,9 @@ TEST(Targets, ThoseOfShippedPlansAreMeasured) {
   EXPECT_GT(targets, 0u);
 }
 
-/// Returns what a plan's best refits lack: "TARGET: STUDY has no ID". The best refit of a table is one of
-/// those that take part, so all that can be the fastest must; bottom_up_recursive and top_down refit the
-/// boxes of bottom_up by slower loops.
+/// Returns the baselines that a plan's best refits lack: "TARGET: STUDY has no ID". The best refit of a table
+/// is one of its participants, so all that can be the fastest must take part; bottom_up_recursive and
+/// top_down refit the boxes of bottom_up by slower loops.
 std::vector<std::string> missing_baselines(const Plan& plan) {
   std::vector<std::string> notes, found;
   for (const Target& target : plan.targets) {
@@ -118,7 +118,7 @@ std::vector<std::string> missing_baselines(const Plan& plan) {
         ids.insert(spec.entry->info.id);
       constexpr const char* fast[] = {"bottom_up", "hybrid", "leaf_slabs", "front"};
       const auto measured = [&](const char* id) { return ids.contains(id); };
-      // Targets take the first table with both sides: not one without any refit.
+      // Targets use the first table with both sides, not one without any refit.
       if (!ids.contains(other.strategy) || std::none_of(std::begin(fast), std::end(fast), measured)) continue;
       for (const char* id : fast)
         if (!measured(id)) found.push_back(target.what + ": " + study.name + " has no " + id);
@@ -290,7 +290,7 @@ TEST(Targets, TheWorstSceneAndTheFastestConfigurationCount) {
   EXPECT_EQ(scenes[2].at("counts"), false);
 }
 
-// One configuration stands for a side in every phase: the one with the shortest clip, not the one that wins a
+// One configuration represents a side in every phase: the one with the shortest clip, not the one that wins a
 // phase.
 TEST(Targets, TheConfigurationWithTheShortestClipCountsInEveryPhase) {
   auto groups = example_groups();
@@ -404,10 +404,10 @@ TEST(Targets, IntervalsAreReproducibleAndHoldTheRatio) {
   groups[1].records[1] = record("bottom_up", 1, {4, 4, 4, 4, 4});
   const json row = row_of(example_plan(), groups), again = row_of(example_plan(), groups);
   EXPECT_EQ(row.at("confidence_interval"), again.at("confidence_interval"));
-  // Of soup: medians of 10, 10, 12, 10, 12 over a constant 4.
+  // For soup: medians of 10, 10, 12, 10, 12 over a constant 4.
   EXPECT_EQ(row.at("confidence_interval"), (json{2.5, 3.0}));
   EXPECT_TRUE(row.at("range").is_null());
-  // Fewer than five repetitions: the range of single ones, and no interval.
+  // With fewer than five repetitions: the range of single ones, and no interval.
   const json few = row_of(example_plan(), example_groups());
   EXPECT_TRUE(few.at("confidence_interval").is_null());
   EXPECT_EQ(few.at("range"), (json{2.5, 3.0}));
@@ -476,7 +476,7 @@ TEST(Targets, BothSidesComeFromOneStudy) {
   EXPECT_EQ(row.at("per_scene").size(), 3u);
 }
 
-// One scene by other kernels is another row, although its hash is the same.
+// One scene with other kernels is another row, although its hash is the same.
 TEST(Targets, OtherKernelsDoNotMix) {
   json plan = example_plan();
   json held = {{"name", "held"}, {"kernels", "portable"}};

@@ -9,7 +9,7 @@
 
 namespace kbvh::experiments {
 
-/// A folder of its own for one test, removed at the end.
+/// A separate folder for one test, removed at the end.
 class TemporaryFolder {
  public:
   TemporaryFolder() {

@@ -1,4 +1,4 @@
-"""What a world and a strategy in Python do not take: each wrong value is a ValueError or TypeError with a sentence, nothing
+"""Wrong input to a world and to a strategy in Python: each wrong value is a ValueError or TypeError with a sentence, nothing
 crashes, and an interruption ends long work."""
 
 import os

@@ -1,4 +1,4 @@
-// Precompiled for the tests: what most of them include. Each test still names what it needs.
+// The precompiled header of the tests: what most of them include. Each test still includes what it needs.
 #include <gtest/gtest.h>
 
 #include <algorithm>

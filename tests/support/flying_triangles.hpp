@@ -6,12 +6,12 @@
 #include "core/scene/scene.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
-// Scenes whose trees age, or stay young, as fast as a test wants.
+// Scenes whose trees age, or stay young, as fast as a test requires.
 
 namespace kbvh::test {
 
 enum class Flight {
-  anywhere,      ///< each triangle to a place of its own
+  anywhere,      ///< each triangle to its own place
   side_by_side,  ///< all the same way
   outwards,      ///< the body grows
 };
@@ -26,7 +26,7 @@ inline Scene<float> flying_triangles(std::uint32_t count, std::uint32_t keyframe
     std::vector<double> times, ways(6 * count), shapes(9 * count);
     for (double& x : ways) x = random.unit();
     for (double& x : shapes) x = size * random.unit();
-    // Neighbours in space begin as neighbours in the list, in a row: a tree of the start is a good one.
+    // Neighbours in space begin as neighbours in the list, in a row: a tree built at the start is good.
     for (std::uint32_t i = 0; i < count; ++i) {
       ways[6 * i] = 2.0 * i / count - 1;
       for (int axis = 0; axis < 3; ++axis) {

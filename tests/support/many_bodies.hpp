@@ -6,9 +6,9 @@
 
 namespace kbvh::test {
 
-/// So many small bodies of `triangles` triangles each in a cube that grows with them: every body touches a
-/// few others, however many there are. Two of three fly a way of about their own size, and deform; the third
-/// rests.
+/// Many small bodies of `triangles` triangles each, in a cube that grows with their number: every body
+/// touches a few others, whatever the total. Two of three fly a distance of about their own size, and deform;
+/// the third rests.
 template <class S>
 Scene<S> many_bodies(std::uint32_t count, std::uint32_t triangles, std::uint32_t keyframes = 3) {
   Scene<S> scene;

@@ -3,7 +3,7 @@
 
 namespace kbvh::test {
 
-/// A vertex that flies on with a velocity from the time of the change.
+/// Makes a vertex fly on with a velocity from the time of the change.
 template <class S>
 PlanChange<S> flies(std::uint32_t body, std::uint32_t vertex, S x, S y, S z) {
   PlanChange<S> change;

@@ -7,10 +7,10 @@
 
 namespace kbvh::test {
 
-/// Plays a clip from 0 on, query included, and tells what each frame added to the counters.
+/// Plays a clip from 0 on, including queries, and returns what each frame added to the counters.
 template <class S>
 struct Play {
-  /// With the topology that the strategy prefers.
+  /// Uses the topology that the strategy prefers.
   Play(const Scene<S>& scene, const char* id, std::map<std::string, std::string> params)
       : Play(scene, id, std::move(params), find_strategy(id).info.topology.preferred) {}
   Play(const Scene<S>& scene, const char* id, std::map<std::string, std::string> params,
@@ -23,7 +23,7 @@ struct Play {
     session.query(pairs, times);
     last = session.strategy().counters();
   }
-  /// A frame at t, after which plans change as `step` says; null: not at all.
+  /// Plays a frame at t, after which plans change as in `step`; null: no change.
   Counters frame(double t, const typename PlanScript<S>::Step* step = nullptr) {
     session.advance(t, times);
     follow(session, step, times);
@@ -34,7 +34,7 @@ struct Play {
     last = now;
     return added;
   }
-  /// [body][node]; for strategies that show them.
+  /// Returns [body][node]; for strategies that show them.
   std::vector<std::vector<Box<double>>> boxes() {
     std::vector<std::vector<Box<double>>> list;
     for (std::uint32_t body = 0; body < session.scene().bodies.size(); ++body)

@@ -5,7 +5,7 @@
 
 #include "core/motion/piece.hpp"
 
-// Flight plans and triangles in rational arithmetic, from their definitions: for the tests to compare with.
+// Flight plans and triangles in rational arithmetic, from their definitions, as a reference for tests.
 
 namespace kbvh::test {
 
@@ -18,7 +18,7 @@ inline Rational exact(double x) {
   return Rational(x);
 }
 
-/// Where a piece is at a time of it.
+/// Returns the position of a piece at one of its times.
 template <class S>
 Rational value_at(const Piece<S>& piece, double t) {
   const Rational x0 = exact(double(piece.x0)), x1 = exact(double(piece.x1));
@@ -28,13 +28,13 @@ Rational value_at(const Piece<S>& piece, double t) {
   return x0 + (x1 - x0) * (exact(t) - exact(piece.t0)) / (exact(piece.t1) - exact(piece.t0));
 }
 
-/// What lies between two numbers.
+/// Returns a number between two others.
 inline Rational between(const Rational& first, const Rational& last, const Rational& fraction) {
   return first + (last - first) * fraction;
 }
 
-/// Do two closed triangles share a point? Any direction that keeps them apart will do; if there is one, there
-/// is one among those tried here, for segments and points, too.
+/// Returns whether two closed triangles share a point. Any direction that separates them suffices; if there
+/// is one, one of those tried here separates them, also for segments and points.
 class RationalTriangles {
  public:
   static bool intersect(const RationalPoint* a, const RationalPoint* b) {

@@ -82,7 +82,7 @@ std::array<RationalPoint, 3> half_edges(const Obb<S>& box) {
           times(exact(double(box.half[2])) / determinant, cross(a, b))};
 }
 
-// Does a volume contain another one of its kind?
+// Returns whether a volume contains another one of its kind.
 template <class S>
 bool contains(const Box<S>& box, const Box<S>& inner) {
   return box.contains(inner);

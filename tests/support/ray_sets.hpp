@@ -60,7 +60,7 @@ std::vector<Ray<S>> rays_at(const Scene<S>& scene, const Playback<S>& playback, 
     ray.length = std::numeric_limits<S>::infinity();
     towards(ray, point());
     rays.push_back(ray);
-    // Along an axis, through a corner and so along the sides of boxes, from before and from behind.
+    // Along an axis, through a corner and therefore along the sides of boxes, from the front and from behind.
     std::copy_n(point(), 3, ray.origin);
     const int axis = int(random() % 3);
     std::fill_n(ray.direction, 3, S(0));
@@ -76,7 +76,7 @@ std::vector<Ray<S>> rays_at(const Scene<S>& scene, const Playback<S>& playback, 
     std::fill_n(ray.direction, 3, S(0));
     rays.push_back(ray);
   }
-  // Scenes may reach as far as is admissible.
+  // Scenes may extend to the admissible limit.
   for (Ray<S>& ray : rays)
     for (S* const values : {ray.origin, ray.direction})
       for (int axis = 0; axis < 3; ++axis)

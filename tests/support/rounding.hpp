@@ -11,15 +11,15 @@
 
 namespace kbvh::testing_support {
 
-/// Whether KBVH_SLOW asks for the long version.
+/// Returns whether KBVH_SLOW requests the long version.
 inline bool slow() {
   const char* value = std::getenv("KBVH_SLOW");
   return value != nullptr && std::strcmp(value, "0") != 0 && *value != '\0';
 }
 
-/// Whether `rounded` is a value to nearest even: no neighbour is nearer, and none as near with an even last
-/// bit unless ours is even. Halfway points are enough for that: against(a, b) has the sign of value - (a + b)
-/// / 2. Finite results only.
+/// Returns whether `rounded` is a value rounded to nearest even: no neighbour is nearer, and a neighbour that
+/// is as near has an odd last bit. Halfway points suffice for this: against(a, b) has the sign of value - (a
+/// + b) / 2. Finite results only.
 template <class S, class Against>
 bool is_nearest_even_by(S rounded, const Against& against) {
   if (!std::isfinite(rounded) || (rounded == 0 && std::signbit(rounded))) return false;
@@ -35,8 +35,8 @@ bool is_nearest_even_by(S rounded, const Against& against) {
          (against_upper < 0 || (against_upper == 0 && even));
 }
 
-/// Calls `round` (kernels -> values) with each kernel set that runs here; they must agree to the last bit,
-/// and must not differ in anything but what they leave to later stages. Returns the values.
+/// Calls `round` (kernels -> values) with each kernel set that runs here. They must agree to the last bit,
+/// and may differ only in what they leave to later stages. Returns the values.
 template <class S, class Round>
 std::vector<S> with_all_kernels(std::size_t count, const Round& round) {
   struct Restore {

@@ -15,7 +15,7 @@ namespace kbvh::test {
 
 namespace {
 
-/// Everything a body needs, in double, before it is rounded to the scene's scalar.
+/// The data of a body, in double, before it is rounded to the scene's scalar.
 struct RawBody {
   Primitives primitives;
   std::uint32_t vertex_count = 0;
@@ -85,7 +85,7 @@ void make_polygons(RawBody& body, std::uint32_t smallest, std::uint32_t largest,
   body.primitives = polygons;
 }
 
-/// Which plan changes a scene is played with.
+/// The kinds of plan changes with which a scene is played.
 enum class Script : std::uint8_t {
   none,
   random,     // at frames of every kind, with and without knots
@@ -97,7 +97,7 @@ struct RawScene {
   std::vector<RawBody> bodies;
   Script script = Script::none;
   std::optional<GeometryScriptStyle> geometry{};
-  std::vector<std::uint32_t> self{};  ///< bodies with pairs of their own
+  std::vector<std::uint32_t> self{};  ///< bodies with pairs within them
 };
 
 /// The scalar's largest admissible coordinate or velocity, the smallest above zero, and the distance from 1
@@ -117,8 +117,8 @@ struct FarSheet {
   }
 };
 
-/// Two sheets, a gap of 0.1 apart, one over the other, with numbers far beyond their size: what rounding does
-/// at `far` is 0.01, and single vertices are still further away. 0: the same scene without these numbers.
+/// Two sheets, a gap of 0.1 apart, one over the other, with numbers far beyond their size: the rounding error
+/// at `far` is 0.01, and single vertices are even further away. 0: the same scene without these numbers.
 RawScene raw_far_scene(const std::string& name, std::uint32_t n, std::uint32_t keyframes, double far) {
   const bool wavy = name == "far_waves", translates = name == "far_translation";
   const double place = name == "far_sheets" || wavy || translates ? far : 0;
@@ -268,7 +268,7 @@ RawScene raw_scene(const std::string& name, const Range& range) {
                    Script::none};
     return scene;
   }
-  // Every triangle has a twin that flies with it, apart only in some of the keyframe intervals: to a side of
+  // Every triangle has a twin that flies with it, apart only in some of the keyframe intervals: for a side of
   // a box neither twin is better while they are together, and either may be when they part.
   if (name == "coincident_intervals") {
     RawScene scene{{soup(60, 28, 7, 0.3, 0.3), soup(50, 29, 7, 0.3, 0.3)}, Script::none};
@@ -282,8 +282,8 @@ RawScene raw_scene(const std::string& name, const Range& range) {
           }
     return scene;
   }
-  // Across the whole admissible range within a second, or by the smallest step that the scalar knows. Few
-  // triangles: nearly every decision is one for exact arithmetic.
+  // Across the whole admissible range within a second, or by the smallest step of the scalar. Few triangles:
+  // nearly every decision needs exact arithmetic.
   if (name == "extreme_velocities" || name == "extreme_plan_changes") {
     RawScene scene{{soup(14, 30, 5, 0.3, 0.3), soup(11, 31, 5, 0.3, 0.3)}, Script::none};
     if (name == "extreme_plan_changes") scene.script = Script::extreme;
@@ -301,7 +301,7 @@ RawScene raw_scene(const std::string& name, const Range& range) {
     }
     return scene;
   }
-  // Single keyframes: nobody can know that these bodies will move before their plans are changed.
+  // Single keyframes: no strategy can know that these bodies will move before their plans are changed.
   if (name == "plans_start_at_rest")
     return {{soup(70, 32, 1, 0.3, 0), soup(60, 33, 1, 0.3, 0)}, Script::takes_off};
   if (name == "plans_move_the_obstacle")
@@ -384,7 +384,7 @@ PlanScript<S> make_script(const Scene<S>& scene, const std::vector<double>& fram
   return script;
 }
 
-/// A third of the vertices, each changed once: how far the fastest come stays within the scalar's own range.
+/// A third of the vertices, each changed once: even the fastest stays within the scalar's own range.
 template <class S>
 PlanScript<S> extreme_script(const Scene<S>& scene, const std::vector<double>& frames, const Range& range) {
   Random random(78);

@@ -12,21 +12,21 @@ template <class S>
 struct TestScene {
   Scene<S> scene;
   PlanScript<S> script;  ///< empty unless plans change
-  /// l for each keyframe interval, or the scene's own where single keyframes say nothing of time.
+  /// l for each keyframe interval, or the scene's own frames if single keyframes define no times.
   std::vector<double> frames;
 };
 
-/// Names of all synthetic scenes, each aimed at one thing that goes wrong in practice.
+/// Returns the names of all synthetic scenes, each aimed at one practical problem.
 const std::vector<std::string>& synthetic_scene_names();
 
-/// The same where geometry changes, at every frame or every second one: for those who can follow.
+/// Scenes whose geometry changes, at every frame or every second one, for strategies that can follow.
 const std::vector<std::string>& geometry_scene_names();
 
 /// Scenes that ask for pairs within bodies, too; some of these change plans, or geometry.
 const std::vector<std::string>& self_scene_names();
 
-/// Those of the first in which a gap of 0.1 between two sheets lies among numbers of which half a unit of
-/// rounding is 0.005: far from the origin, or because of one vertex or triangle of the same body.
+/// Returns those of the first list in which a gap of 0.1 between two sheets lies among numbers whose half
+/// unit of rounding is 0.005: far from the origin, or because of one vertex or triangle of the same body.
 const std::vector<std::string>& far_scene_names();
 
 /// Makes such a scene with sheets of n x n vertices, or the same without the large numbers.
@@ -50,7 +50,7 @@ class Random {
     return state_ * 0x2545f4914f6cdd1dull;
   }
   std::uint32_t below(std::uint32_t n) { return std::uint32_t((next() >> 33) % n); }
-  /// In [-1, 1).
+  /// Returns a number in [-1, 1).
   double unit() { return double(next() >> 11) * 0x1p-52 - 1.0; }
 
  private:

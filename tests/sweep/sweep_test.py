@@ -1,4 +1,4 @@
-"""Runs small plans by experiments/sweep and by `kbvh run`, and compares: the same records but for times.
+"""Runs small plans by experiments/sweep and by `kbvh run`, and compares: the same records except for times.
 
 usage: sweep_test.py KBVH SWEEP PART [TIMES] [SEED]
 Parts: local, killed (kills workers at random), disk (a disk that fills up), slurm (a cluster of this machine alone).
@@ -58,7 +58,7 @@ def in_two_studies(record: dict[str, Any]) -> bool:
 
 
 def without_times(file: Path, torn: bool = False) -> dict[str, Any]:
-    """Returns by key what each record says but times, and what depends on when and by whom it was made."""
+    """Returns by key the content of each record, except times and what depends on when and by which job it was made."""
     found = {}
     for record in lines_of(file, torn):
         times = record.pop("times")
@@ -170,7 +170,7 @@ exec "$KBVH" "$@" """,
     require(len(list(attempts(out))) == len(done), "nothing is done again", again)
     require((out / "results.jsonl").read_bytes() == before, "the results are as before")
     damaged(study, out)
-    # What is in the results already is not measured again, whoever has measured it.
+    # What is in the results already is not measured again, no matter by which means it was measured.
     over = study.folder / "over"
     shutil.copytree(study.folder / "whole", over)
     whole = (over / "results.jsonl").read_bytes()

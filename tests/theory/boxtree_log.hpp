@@ -44,7 +44,7 @@ std::vector<std::uint32_t> stored_bounds(const Tree& tree) {
   return bounds;
 }
 
-/// Boxes of all nodes as a query would reconstruct them, at the motion's time.
+/// Returns the boxes of all nodes as a query would reconstruct them, at the motion's time.
 template <class S, class Tree>
 std::vector<Box<S>> reconstructed_boxes(const Tree& tree, const SampledMotion<S>& motion,
                                         std::uint32_t body) {
@@ -58,7 +58,7 @@ std::vector<Box<S>> reconstructed_boxes(const Tree& tree, const SampledMotion<S>
   return all;
 }
 
-/// What is played, and how.
+/// The parameters of a play.
 struct BoxTreePlay {
   BuilderConfig builder{.width = 2, .leaf_size = 1};
   std::uint32_t frames_per_keyframe = 1;
@@ -74,9 +74,9 @@ struct BoxTreeReport {
   std::uint64_t changes_by_event = 0;  ///< log entries, changes of plans left out
 };
 
-/// Plays a scene through a forest of BoxTrees and proves, from one change of plans or rebuilding to the next,
-/// that all it stores is the exact envelope of what lies below (check_envelopes). `BoxTree` is the kind of
-/// tree: faulty ones derive from KineticBoxTree.
+/// Plays a scene through a forest of BoxTrees. Proves, from one change of plans or rebuilding to the next,
+/// that everything it stores is the exact envelope of the vertices below (check_envelopes). `BoxTree` is the
+/// kind of tree: faulty ones derive from KineticBoxTree.
 template <class S, template <class> class Queue,
           template <class, class, class> class BoxTree = KineticBoxTree>
 class BoxTreeProof {
@@ -124,7 +124,7 @@ class BoxTreeProof {
       if (step != test_.script.steps.end() && step->time == t) change_plans(*step++, t);
       if (play_.rebuild_seed != 0) rebuild(t);
     }
-    // Past the last keyframe bodies rest; plans of their own go on.
+    // Past the last keyframe bodies rest; vertices' own plans continue.
     last += test_.script.steps.empty() ? 1.0 : 3.0;
     forest_->advance(last);
     close(last);
@@ -140,7 +140,7 @@ class BoxTreeProof {
     return all;
   }
 
-  /// Sides are owned by all nodes that are to, and no others.
+  /// Expects that exactly the intended nodes own sides.
   template <class Tree>
   void check_bare(const Tree& tree) {
     const std::uint32_t bare = play_.construction.bare_leaves;
@@ -159,7 +159,7 @@ class BoxTreeProof {
     if (report_.envelope.violation.empty()) report_.envelope.violation = what;
   }
 
-  /// Ends what lies between two changes: proves its log.
+  /// Ends the time between two changes: proves its log.
   void close(double until) {
     const Bounds end = bounds();
     for (std::uint32_t body = 0; body < view_.body_count(); ++body) {
@@ -218,7 +218,8 @@ class BoxTreeProof {
     start_ = bounds();
   }
 
-  /// The notices at a change of plans: from the state before to the state after, each a gain at once.
+  /// Checks the notices at a change of plans: from the state before to the state after, each an immediate
+  /// gain.
   void check_notices(double t) {
     Bounds state = start_;
     std::map<std::uint32_t, ExactMotion> motions;
@@ -236,7 +237,7 @@ class BoxTreeProof {
 
   /// Rebuilds up to three parts of each body: large ones, small ones, one below the other.
   void rebuild(double t) {
-    forest_->advance(t);  // new plans may cross at once
+    forest_->advance(t);  // new plans may cross immediately
     close(t);
     for (std::uint32_t body = 0; body < view_.body_count(); ++body)
       for (std::uint32_t i = random_.below(4); i > 0; --i) {

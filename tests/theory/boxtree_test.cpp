@@ -1,5 +1,5 @@
-// The kinetic BoxTree's log of realiser changes against exact envelopes computed apart; validity between
-// events; what its certificate searches cost (claims T11, T12).
+// The kinetic BoxTree's log of realiser changes against independently computed exact envelopes; validity
+// between events; the cost of its certificate searches (claims T11, T12).
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -47,7 +47,7 @@ BoxTreeReport prove_with_all_queues(const TestScene<S>& test, const BoxTreePlay&
   return report;
 }
 
-/// As `kinetic_boxtree` is made where nothing else is said, but that small trees have bare parts, too.
+/// The defaults of `kinetic_boxtree`, except that small trees have bare parts, too.
 constexpr BoxTreeConstruction for_the_clip{
     .planes = PlaneChoice::clip, .candidates = Candidates::listed, .bare_leaves = 4};
 
@@ -137,8 +137,8 @@ TEST(BoxTree, EventsDoNotDependOnTheNumberOfFrames) {
 
 // ---- Seeded faults that the proof must catch -------------------------------------------------------------
 
-/// A tree whose lists of candidates lack the vertices of leaves, as after a search that does not go down to
-/// the leaves below other sides.
+/// A tree whose lists of candidates lack the vertices of leaves, as if the search had not descended to the
+/// leaves below other sides.
 template <class S, class Queue, class Observer>
 class ForgetsLeaves : public KineticBoxTree<S, Queue, Observer> {
  public:
@@ -148,7 +148,7 @@ class ForgetsLeaves : public KineticBoxTree<S, Queue, Observer> {
     for (auto& bound : this->bounds_) bound.last = bound.vertices;
   }
 };
-/// A tree whose lists of candidates lack one bound below, as after a search that leaves out one child.
+/// A tree whose lists of candidates lack one bound below, as if the search had skipped one child.
 template <class S, class Queue, class Observer>
 class ForgetsAChild : public KineticBoxTree<S, Queue, Observer> {
  public:
@@ -172,8 +172,8 @@ TEST(BoxTreeFaults, AreCaught) {
 
 // ---- Between events --------------------------------------------------------------------------------------
 
-/// Brings a forest to times that frames do not know, right before, at and after events, and audits the boxes
-/// that a query would read there.
+/// Brings a forest to times that are not frames, right before, at and after events, and audits the boxes that
+/// a query would read there.
 template <class S>
 std::uint64_t audit_between_events(const std::string& name) {
   const auto test = synthetic_scene<S>(name);
@@ -208,11 +208,11 @@ std::uint64_t audit_between_events(const std::string& name) {
     if (event > before) {
       const double between = before + 0.5 * (event - before);
       audit_at(between);
-      // The hint is off by a rounding or two: this lies before, at or after the event.
+      // The hint has an error of one or two roundings: this time is before, at or after the event.
       if (event > between) audit_at(event);
       before = std::max(between, event);
     } else {
-      // What happens now must not be looked at from a time before.
+      // After what happens now, no earlier time may be audited.
       before = std::max(before, std::nextafter(event + error, last + 1));
       forest.handle_next();
     }
@@ -228,7 +228,7 @@ TEST(BoxTree, IsValidBetweenEvents) {
   }
 }
 
-/// Points on slow circles: many realisers last for longer than queues look ahead at once.
+/// Points on slow circles: many realisers last longer than queues look ahead at once.
 TestScene<float> circling_points(std::uint32_t count, std::uint32_t keyframes) {
   Body<float> body;
   body.name = "points";
@@ -260,8 +260,8 @@ TEST(BoxTree, LongClipsAreLookedAtInParts) {
 
 // ---- Rows that queries read ------------------------------------------------------------------------------
 
-/// Makes all rows of a scene's trees at each frame, as queries would, and holds them against the boxes that
-/// single nodes inherit. Returns how many boxes were compared.
+/// Makes all rows of a scene's trees at each frame, like queries, and compares them with the boxes that
+/// single nodes inherit. Returns the number of boxes compared.
 template <class S>
 std::uint64_t compare_rows(const std::string& name, const BoxTreeConstruction& construction,
                            LeafBoxes leaf_boxes, std::uint32_t leaf_size) {
@@ -323,7 +323,7 @@ TEST(BoxTreeRows, AreTheInheritedBoxes) {
 // ---- The cost of certificate searches (T12) --------------------------------------------------------------
 
 constexpr BoxTreeConstruction one_axis{.root_axis = 0, .inner_axis = 0};
-/// The root is split on x, all else on y (Z&W fig. 10).
+/// The root is split on x, all other nodes on y (Z&W fig. 10).
 constexpr BoxTreeConstruction adversarial{.root_axis = 0, .inner_axis = 1};
 
 /// Points that wander on the first `axes` axes from keyframe to keyframe; the others stay 0.
@@ -351,7 +351,7 @@ struct EventCost {
   double per_search() const { return double(nodes) / double(searches); }
 };
 
-/// What the events cost that happen at `node` (none: at any).
+/// Returns the cost of the events at `node` (none: at any node).
 EventCost cost_of_events(const TestScene<double>& test, const BoxTreeConstruction& construction,
                          std::optional<std::uint32_t> at_node = {}) {
   const SceneView<double> view(test.scene);
@@ -384,7 +384,7 @@ TEST(BoxTreeSearch, IsLogarithmicOnOneAxis) {
     std::printf("one axis, %u leaves: %llu events, %.2f nodes per search, at most %llu\n", n,
                 (unsigned long long)cost.events, cost.per_search(), (unsigned long long)cost.most_per_search);
     EXPECT_GT(cost.events, n / 2);
-    // Down one path, and at each of its nodes the other child's realiser.
+    // Down one path, reading at each of its nodes the other child's realiser.
     EXPECT_LE(cost.most_per_search, 2 * std::uint64_t(std::log2(n)) + 1);
   }
 }

@@ -1,4 +1,5 @@
-// The kinetic AABB tree's log of bound changes against exact envelopes computed apart (claims T1, T7, T8).
+// The kinetic AABB tree's log of bound changes against independently computed exact envelopes (claims T1, T7,
+// T8).
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -61,7 +62,7 @@ std::string summary(const EnvelopeReport& r) {
          std::to_string(r.several_steps) + ", choices " + std::to_string(r.choices);
 }
 
-/// Looks at each certificate again at every keyframe.
+/// Reviews each certificate at every keyframe.
 template <class S>
 class ShortSightedQueue : public SegmentHeapQueue<S> {
  public:
@@ -69,7 +70,7 @@ class ShortSightedQueue : public SegmentHeapQueue<S> {
   static constexpr std::size_t look_ahead() { return 1; }
 };
 
-/// All queues over one play: their logs must be one, which is then proved.
+/// Plays all queues: their logs must be equal, and one of them is proved.
 template <class S>
 EnvelopeReport prove(const TestScene<S>& test, const Play& play) {
   const auto recording = test::record(test, play);
@@ -167,7 +168,7 @@ TEST(EnvelopeFaults, RemovedEntry) {
   for (int i = 0; i < faults; ++i) {
     Case wrong = right;
     const std::size_t at = random.below(std::uint32_t(wrong.log.size()));
-    // Mended so that nothing but the values can give it away.
+    // Corrected so that only the values can reveal it.
     const std::size_t next = next_of_bound(wrong.log, at);
     if (next < wrong.log.size())
       wrong.log[next].old_vertex = wrong.log[at].old_vertex;
@@ -185,7 +186,7 @@ TEST(EnvelopeFaults, ShiftedInstant) {
     Case wrong = right;
     const std::size_t at = random.below(std::uint32_t(wrong.log.size()));
     BoundChange& change = wrong.log[at];
-    // By far less than a double could tell; later or earlier.
+    // By far less than a double could resolve; later or earlier.
     change.when.u += exact(i % 2 == 0 ? 0x1p-90 : -0x1p-90);
     if (change.when.u < 0) change.when.u = exact(0x1p-90);
     std::stable_sort(wrong.log.begin(), wrong.log.end(),

@@ -1,6 +1,6 @@
-// Insertion and deletion while a kinetic AABB tree or BoxTree runs: between any two changes its log of bound
-// changes is proved to be the exact envelopes of what then is below each node, at all times and from the
-// first instant.
+// Insertion and deletion while a kinetic AABB tree or BoxTree runs: between any two changes, its log of bound
+// changes is proved to equal the exact envelopes of the vertices then below each node, at all times and from
+// the first instant.
 
 #include <gtest/gtest.h>
 
@@ -17,7 +17,7 @@ namespace {
 
 using namespace kbvh::theory;
 
-/// A change of a bound at an event, as it was told.
+/// A change of a bound at an event, as reported.
 template <class S>
 struct Told {
   std::uint32_t body, node, side, old_vertex, new_vertex;
@@ -37,7 +37,7 @@ struct Listener {
   void realiser_plan_changed(std::uint32_t /*body*/, std::uint32_t /*node*/) {}
 };
 
-/// Plans with new vertices at the end: their keyframes mean nothing, for they have plans of their own.
+/// Adds plans of new vertices at the end: their keyframes are unused, because they have plans of their own.
 void add_vertices(StoredPlans& plans, std::uint32_t count) {
   StoredPlans grown = plans;
   grown.vertex_count += count;
@@ -66,7 +66,7 @@ class Prover {
  public:
   using Forest = KineticForest<S, AvlQueue<S>, Listener<S>, Tree>;
 
-  /// Not 0: at every change, parts chosen at random are rebuilt too, if the tree can do so.
+  /// Not 0: at every change, parts chosen at random are also rebuilt, if the tree can do so.
   Prover(const TestScene<S>& test, const BuilderConfig& builder, std::uint64_t rebuild_seed = 0)
       : random_(rebuild_seed),
         rebuilds_(rebuild_seed != 0),
@@ -100,9 +100,9 @@ class Prover {
   }
 
  private:
-  /// Rebuilds up to three parts of each body, one maybe below the other.
+  /// Rebuilds up to three parts of each body, possibly one below another.
   void rebuild(double t) {
-    forest_->advance(t);  // what changed may cross at once
+    forest_->advance(t);  // changed plans may cross immediately
     const ClipMotion<S> motion(playback_);
     for (std::uint32_t body = 0; body < plans_.size(); ++body)
       for (std::uint32_t i = random_.below(4); i > 0; --i) {
@@ -132,7 +132,7 @@ class Prover {
       if (rebuilds_) rebuild(t);
   }
 
-  /// Realisers in the order of the compacted topology; `no_bound` where a tree stores none.
+  /// Returns the realisers in the order of the compacted topology; `no_bound` if a tree stores none.
   std::vector<std::uint32_t> realisers(std::uint32_t body) const {
     std::vector<std::uint32_t> all;
     const auto& tree = forest_->tree(body);
@@ -161,7 +161,7 @@ class Prover {
       EnvelopeReport report;
       try {
         report = prove(t, body);
-      } catch (const std::logic_error& error) {  // a log that makes no sense
+      } catch (const std::logic_error& error) {  // an inconsistent log
         report.violation = error.what();
       }
       if (!report.violation.empty())
@@ -261,7 +261,7 @@ INSTANTIATE_TEST_SUITE_P(Scenes, GeometryEnvelopes, testing::ValuesIn(geometry_s
 
 // ---- Seeded fault: the proof must catch it ---------------------------------------------------------------
 
-/// A tree that does not carry an insertion up to the root: the root keeps its realisers.
+/// A tree that does not propagate an insertion up to the root: the root keeps its realisers.
 template <class S, class Queue, class Observer>
 class ForgetfulBoxTree : public KineticBoxTree<S, Queue, Observer> {
  public:
@@ -313,10 +313,10 @@ Scene<double> wandering_triangles(std::uint32_t count) {
 }
 
 struct EditCost {
-  double certificates = 0, nodes = 0;  ///< per edit: certificates made again, nodes that searches looked at
+  double certificates = 0, nodes = 0;  ///< per edit: recomputed certificates, nodes visited by searches
 };
 
-/// Of the changes halfway through the clip.
+/// Returns the cost of the changes halfway through the clip.
 EditCost cost_of_edits(std::uint32_t count, const GeometryChange<double>& change) {
   const Scene<double> scene = wandering_triangles(count);
   ChangingScene<double> changing(scene);
@@ -356,7 +356,7 @@ TEST(BoxTreeEdits, AreLocal) {
       if (count == 128) first[kind] = costs[kind];
       std::printf("%u triangles, %s: %.2f certificates made again, %.0f nodes looked at\n", count,
                   kind == 0 ? "insertion" : "removal", costs[kind].certificates, costs[kind].nodes);
-      // Six and those of new nodes, and further up only where realisers change.
+      // Six, and those of new nodes; further up only where realisers change.
       EXPECT_LT(costs[kind].certificates, 16);
       // Searches are not logarithmic (Z&W s.6), but less than linear.
       EXPECT_LT(costs[kind].nodes, first[kind].nodes * std::pow(double(count) / 128, 0.85) + 1);

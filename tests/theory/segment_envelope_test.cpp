@@ -1,5 +1,5 @@
-// The stores of segment envelopes against exact envelopes computed apart (claims T1, T8): over whole clips,
-// on every synthetic scene without changes, entry by entry.
+// The stores of segment envelopes against independently computed exact envelopes (claims T1, T8): over whole
+// clips, on every synthetic scene without changes, entry by entry.
 #include "core/families/envelope/segment_envelope.hpp"
 
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@ namespace {
 
 using namespace kbvh::theory;
 
-/// What a body's envelopes said over its whole clip, as the checker wants it.
+/// Records the envelopes of a body over its whole clip in the form that the checker needs.
 template <class S>
 struct Log {
   VerticesBelow below;
@@ -75,7 +75,7 @@ Log<S> log_of(const Body<S>& body, const ExactMotion& motion, const BuilderConfi
     }
     std::stable_sort(log.changes.begin() + std::ptrdiff_t(first), log.changes.end(),
                      [](const BoundChange& a, const BoundChange& b) { return a.when < b.when; });
-    // Half of it by a frame within the segment: the rest is then due at its end.
+    // Half of it by a frame within the segment: the rest is due at its end.
     envelope.advance(times[k] + 0.4 * (times[k + 1] - times[k]), realisers);
     envelope.advance(times[k + 1], realisers);
     EXPECT_EQ(realisers, present) << "the stores were not all carried out";
@@ -105,7 +105,7 @@ void prove(const std::string& name) {
         if (log.changes.empty()) continue;
         log.changes.erase(log.changes.begin() + std::ptrdiff_t(log.changes.size() / 2));
         EXPECT_FALSE(check_envelopes(motion, log.below, log.start, log.changes, log.end).holds())
-            << "a store less, and nobody notices";
+            << "a missing store is not noticed";
       }
   }
   std::printf("%s %s: %llu bounds, %llu stores, %llu net changes = %llu breakpoints\n", name.c_str(),

@@ -23,7 +23,7 @@ Rational value_at(const Piece<S>& piece, const Rational& t) {
   return line.x0 + line.slope * (t - line.t0);
 }
 
-/// A side of a box at t, widened as the list does it: at the knots of its piece.
+/// Returns a side of a box at t, widened as in the list: at the knots of its piece.
 template <class S>
 Piece<S> side_piece(const FlightPlans<S>& plans, std::uint32_t vertex, int axis, int widening, double t) {
   Piece<S> piece = plans.piece_after(vertex, axis, t);
@@ -35,7 +35,7 @@ Piece<S> side_piece(const FlightPlans<S>& plans, std::uint32_t vertex, int axis,
   return piece;
 }
 
-/// Is a below b at t? In rationals, but where doubles leave no doubt by far.
+/// Returns whether a is below b at t, in rationals unless doubles are clearly sufficient.
 template <class S>
 bool below(const Piece<S>& a, const Piece<S>& b, double t) {
   double difference = 0, scale = 0;
@@ -57,7 +57,7 @@ class Auditor {
  public:
   Auditor(const Collision& collision, const SceneView<S>& scene) : collision_(collision), scene_(scene) {}
 
-  /// Compares list and traversal at t, which no event is at; says what differs, or nothing.
+  /// Compares list and traversal at t, at which there is no event; returns the difference, or nothing.
   std::string compare(double t) {
     for (std::uint32_t i = 0; i < scene_.pairs().size(); ++i) {
       std::set<ListEntry> fresh, kept;
@@ -126,7 +126,7 @@ struct Kinds {
   bool operator==(const Kinds&) const = default;
 };
 
-/// Plays a scene event by event on queues of a kind (AnyEventQueue) and audits some `audits` times.
+/// Plays a scene event by event on queues of a kind (AnyEventQueue) and performs about `audits` audits.
 template <class S>
 Kinds play(const std::string& name, const BuilderConfig& builder, std::uint64_t audits,
            std::string_view queue, int look_ahead = OverlapClock<S>::usual_look_ahead) {
@@ -136,7 +136,7 @@ Kinds play(const std::string& name, const BuilderConfig& builder, std::uint64_t 
   Kinds kinds;
   std::uint64_t every = 1, compared = 0;
   bool wanted = false;
-  // The first run counts the events, the second audits between as many as asked for.
+  // The first run counts the events; the second audits between the requested number of them.
   for (const bool auditing : {false, true}) {
     ChangingScene<S> changing(test.scene);
     const SceneView<S> view(changing.scene());
@@ -210,7 +210,7 @@ TEST_P(SeparationLists, EqualATraversalBetweenEvents) {
   const Kinds kinds = play<float>(GetParam(), binary, 40, avl);
   play<double>(GetParam(), {.width = 4, .leaf_size = 3}, 20, BinaryHeapQueue<double>::name);
   EXPECT_EQ(kinds, play<float>(GetParam(), binary, 40, segment_heap));
-  // Who looks less far ahead sees the same.
+  // A shorter look-ahead gives the same result.
   for (const int look_ahead : {1, 2}) EXPECT_EQ(kinds, play<float>(GetParam(), binary, 20, avl, look_ahead));
 }
 INSTANTIATE_TEST_SUITE_P(Scenes, SeparationLists, testing::ValuesIn(synthetic_scene_names()),
@@ -259,7 +259,7 @@ struct Locality {
   double work, list;  ///< pairs per primitive inserted or deleted; pairs in the list
 };
 
-/// Triangles of either sheet whose boxes meet the other sheet's are taken out, one at a time, and inserted
+/// Removes the triangles of either sheet whose boxes meet the other sheet's, one at a time, and inserts them
 /// again on their vertices.
 Locality locality(std::uint32_t n) {
   using Collision = KineticCollision<float, AnyEventQueue>;
@@ -306,7 +306,7 @@ Locality locality(std::uint32_t n) {
   return {double(total.removed + total.decided) / (2 * rounds), double(collision.list().size())};
 }
 
-// What an insertion or deletion costs is what stands below a few nodes, not the list.
+// The cost of an insertion or deletion depends on the pairs below a few nodes, not on the list.
 TEST(SeparationListGeometry, ChangesAreLocal) {
   std::vector<Locality> found;
   for (const std::uint32_t n : {8u, 16u, 32u, 64u}) {
@@ -333,7 +333,7 @@ TEST(SeparationListEvents, EachKindHappensOftenInTheTestScenes) {
   EXPECT_GE(all.changes, 1000u);
 }
 
-// A list that hears only some of its trees' changes is found out.
+// A list that receives only some of its trees' changes is detected.
 TEST(SeparationListFaults, MissedNotices) {
   const auto test = synthetic_scene<float>("sheets");
   const SceneView<float> view(test.scene);
@@ -352,14 +352,14 @@ TEST(SeparationListFaults, MissedNotices) {
       for (const double t : frame_times(test.scene, 4)) {
         while (collision.due(t))
           if (collision.tree_is_first() && ++events % missed == 0)
-            collision.forest().handle_next();  // of which the list hears nothing
+            collision.forest().handle_next();  // which is not reported to the list
           else
             collision.handle_next();
         const double after = std::nextafter(t, 1e300);
         if (!collision.due(after) && !auditor.compare(after).empty()) found = true;
         if (found) break;
       }
-    } catch (const std::invalid_argument&) {  // an event that cannot be
+    } catch (const std::invalid_argument&) {  // an impossible event
       found = true;
     }
     EXPECT_TRUE(found) << "every notice of " << missed;

@@ -1,4 +1,4 @@
-// `kbvh theory` as a shell sees it: what CI runs, its table and its file.
+// `kbvh theory` from a shell's point of view: the run of CI, its table and its file.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
@@ -28,7 +28,7 @@ class TheoryProgram : public testing::Test {
     folder_ = name;
   }
   void TearDown() override { fs::remove_all(folder_); }
-  /// Its exit code; what it said is in `out` and `err`.
+  /// Returns its exit code; its output is in `out` and `err`.
   int kbvh(const std::string& arguments) {
     const std::string command = "cd '" + folder_.string() +
                                 "' && KBVH_CACHE=cache '" KBVH_PROGRAM "' theory " + arguments +

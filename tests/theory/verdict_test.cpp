@@ -1,5 +1,5 @@
-// kbvh theory: verdicts follow from numbers and nothing else; each can be lost. The constructed scenes are
-// what they are said to be.
+// kbvh theory: verdicts follow from numbers alone, and each can fail. The constructed scenes have their
+// stated properties.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -115,7 +115,7 @@ TEST(Verdict, NothingMeasuredDecidesNothing) {
 
 // ---- Every claim both ways -------------------------------------------------------------------------------
 
-/// Spoils one number of good data and expects another verdict, and another reason.
+/// Spoils one number of good data and expects a different verdict, and a different reason.
 template <class Run, class Judge, class Spoil>
 void expect_flip(const std::vector<Run>& good, Verdict expected, Verdict spoilt, Judge judge, Spoil spoil) {
   const Claim right = judge(good);
@@ -169,7 +169,7 @@ TEST(Verdict, NumberOfEvents) {
   };
   ASSERT_EQ(fit_growth(good, 6).size(), 1u);
   EXPECT_TRUE(fit_growth(good, 7).empty());
-  // Shapes have a smallest size: two requests below it are one size, in whatever order they come.
+  // Shapes have a minimum size: two requests below it are one size, in either order.
   const std::vector<CountRun> same(6, count_run(250));
   EXPECT_TRUE(fit_growth(same, 6).empty());
   std::vector<CountRun> repeated = good;

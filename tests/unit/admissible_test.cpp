@@ -1,5 +1,5 @@
-// The admissible range of coordinates, velocities and times: what is beyond it is refused before anybody
-// plays it, and what is within it everybody plays.
+// The admissible range of coordinates, velocities and times: values beyond it are refused before any strategy
+// plays them, and values within it are played by all.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -72,13 +72,13 @@ void refuses() {
   EXPECT_EQ(said(fast, {0, 1, 11}), "vertex 3 of body 0 is at z = " + number_text(double(speed) * 11) +
                                         " at t = 11 s, outside the admissible range (" +
                                         (sizeof(S) == 4 ? "8e+30 in float)" : "8e+100 in double)"));
-  // The issue's: one vertex with velocity (0, 0, 1e29), frames 1e30 s apart.
+  // One vertex with velocity (0, 0, 1e29), and frames 1e30 s apart.
   EXPECT_NE(said(steps<S>({{0, {flies<S>(1, 0, 0, 0, S(1e29))}}}), {0, 1e30, 1e80}).find("at t = 1e+80 s"),
             std::string::npos);
   EXPECT_NE(said(steps<S>({{0, {flies<S>(0, 1, most, 0, 0)}}}), {0, 1e300}).find("8e270"), std::string::npos);
   EXPECT_NE(said(steps<S>({{0, {flies<S>(0, 1, -most, 0, 0)}}}), {0, 1e250}).find("x = -"),
             std::string::npos);
-  // Another plan in time, and steps after the last frame, do no harm.
+  // Replacing the plan in time, and steps after the last frame, do no harm.
   EXPECT_EQ(
       said(steps<S>({{0, {flies<S>(0, 3, 0, 0, most / 10)}}, {5, {flies<S>(0, 3, 0, 0, 0)}}}), {0, 5, 100}),
       "nothing was thrown");
@@ -137,7 +137,7 @@ TEST(Admissible, CornersAreLimited) {
             "body 'large': primitive 1 has 4096 corners; at most 4095 are possible");
 }
 
-// What everybody is held against may be played.
+// All strategies may play the scenes with which they are tested.
 TEST(Admissible, TheScenesOfTheConformanceTestsAre) {
   for (const std::string& name : test::synthetic_scene_names())
     for (const std::uint32_t l : {1u, 3u, 7u}) {
@@ -156,14 +156,14 @@ TEST(Admissible, TheScenesOfTheConformanceTestsAre) {
 
 class EveryStrategy : public testing::TestWithParam<std::string> {};
 
-/// An eighth of how far positions may reach for a contestant, which may have a narrower range of its own.
+/// An eighth of the range of positions for a contestant, which may have a narrower range of its own.
 template <class S>
 S magnitude_for(const StrategyEntry& entry) {
   return S(std::min(double(admissible_magnitude<S>), entry.info.max_coordinate / 8));
 }
 
-/// What is beyond a contestant's own range is known before, and a session that plays it all the same stops
-/// there.
+/// Violations of a contestant's own range are known before the play, and a session that plays nevertheless
+/// stops at the first one.
 template <class S>
 std::string violation(const StrategyEntry& entry, const Scene<S>& scene, const std::vector<double>& frames,
                       const PlanScript<S>& script) {
@@ -199,7 +199,7 @@ void plays(const StrategyEntry& entry) {
                          steps<S>({{0, {flies<S>(0, 3, 0, 0, S(1e-25)), flies<S>(1, 4, S(1e4), 0, S(1e-30))}},
                                    {5e25, {flies<S>(0, 5, S(1e-27), 0, 0)}}})),
             "");
-  // Long steps first: whoever foresees as many again would be far out of the range.
+  // Long steps first: a strategy that foresees as many again would leave the range by far.
   EXPECT_EQ(
       violation<S>(entry, scene, {0, 1e9, 2e9, 3e9, 3e9 + 1, 3e9 + 2},
                    steps<S>({{0, {flies<S>(0, 3, 0, 0, S(1e-9))}}, {3e9, {flies<S>(1, 4, 0, most / 4, 0)}}})),
@@ -211,7 +211,7 @@ TEST_P(EveryStrategy, PlaysWhatIsAdmissible) {
   plays<double>(find_strategy(GetParam()));
 }
 
-/// Velocities and times of all sizes: either nobody plays the script, or everybody does.
+/// Velocities and times of all sizes: either all strategies play the script, or none.
 template <class S>
 void plays_or_refuses(const StrategyEntry& entry) {
   if (entry.factory<S>() == nullptr) return;

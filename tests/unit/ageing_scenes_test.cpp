@@ -62,7 +62,7 @@ TEST_P(AgeingScenes, AreSoundAtEverySize) {
       const LoadedScene scene = loaded(GetParam().name, triangles, keyframes);
       for (const io::AnimatedMesh& mesh : scene.meshes) expect_sound(mesh, mesh.moving() ? keyframes : 1);
       EXPECT_TRUE(scene.meshes[0].moving());
-      // The nearest number that the pattern allows: patterns are coarse in small sizes.
+      // The nearest number that the pattern allows: patterns are coarse at small sizes.
       if (triangles < 2000) continue;
       EXPECT_NEAR(double(scene.meshes[0].primitive_count()), 2000, 120) << GetParam().name;
     }
@@ -87,7 +87,8 @@ TEST_P(AgeingScenes, SameSeedSameBits) {
         ASSERT_EQ(double(single.bodies[body].plans.keyframe(k)[i]), twice.bodies[body].plans.keyframe(k)[i]);
 }
 
-/// Returns the SAH cost of the first keyframe's tree at the last keyframe, over that of a tree built there.
+/// Returns the SAH cost at the last keyframe of the first keyframe's tree, divided by that of a tree built
+/// there.
 double ageing(const LoadedScene& loaded) {
   const Scene<float> scene = assemble<float>(loaded);
   double kept = 0, rebuilt = 0;
@@ -113,7 +114,7 @@ INSTANTIATE_TEST_SUITE_P(All, AgeingScenes, testing::ValuesIn(scenes_that_age())
                          [](const auto& test) { return std::string(test.param.name); });
 
 TEST(AgeingScenes, ClosedBodiesAreClosed) {
-  // Every part of a crowd or a swarm is a surface of its own: 2 each.
+  // Every part of a crowd or a swarm is a separate surface: 2 each.
   const LoadedScene swarms = loaded("mixing_swarms", 600, 2);
   for (const io::AnimatedMesh& mesh : swarms.meshes)
     expect_closed(mesh, 2 * std::int64_t(mesh.primitive_count()) / 20);

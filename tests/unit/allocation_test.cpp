@@ -1,5 +1,5 @@
-// Strategies promise that a frame allocates nothing once they are warm: every allocation of this program is
-// counted.
+// Strategies promise that a frame allocates nothing once they are warm: this test counts every allocation of
+// the program.
 
 #include <gtest/gtest.h>
 #include <malloc.h>
@@ -63,8 +63,8 @@ extern "C" int posix_memalign(void** memory, std::size_t alignment, std::size_t 
 namespace kbvh::test {
 namespace {
 
-/// In the third round of a clip, plans changed as the test's script says; that a plan changes in the playback
-/// is not the strategy's doing.
+/// In the third round of a clip, plans change as in the test's script; the change of the plan in the playback
+/// does not count for the strategy.
 template <class S>
 std::string allocations_when_warm(const StrategyEntry& entry, const TestScene<S>& test,
                                   const std::map<std::string, std::string>& params = {},
@@ -122,7 +122,7 @@ TEST(Allocation, NoneOnceWarm) {
     const auto in_float = synthetic_scene<float>(name, 7);
     const auto in_double = synthetic_scene<double>(name, 7);
     for (const StrategyEntry& entry : registry()) {
-      // It makes topologies anew.
+      // It makes new topologies.
       if (entry.info.guarantee != Guarantee::exact || entry.info.id == "rebuild") continue;
       EXPECT_EQ(allocations_when_warm(entry, in_float), "") << entry.info.id << " on " << name << ", float";
       EXPECT_EQ(allocations_when_warm(entry, in_double), "") << entry.info.id << " on " << name << ", double";
@@ -152,7 +152,7 @@ TEST(Allocation, NoneOnceWarmWhereChangesAreAsked) {
   }
 }
 
-/// The same for rays, at every frame.
+/// Does the same for rays, at every frame.
 template <class S>
 std::string allocations_of_rays(const StrategyEntry& entry, const TestScene<S>& test) {
   Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred});
@@ -173,7 +173,7 @@ std::string allocations_of_rays(const StrategyEntry& entry, const TestScene<S>& 
   return {};
 }
 
-// TBB keeps its own pool of blocks, which it fills at first.
+// TBB keeps its own pool of blocks, which it fills first.
 TEST(Allocation, NoneOnceWarmOnSeveralThreads) {
   if (most_threads() < 2) GTEST_SKIP() << "one thread";
   for (const StrategyEntry& entry : registry()) {
@@ -227,8 +227,8 @@ TEST(Allocation, NoneOnceWarmWherePlansChange) {
           !entry.info.can.plan_changes)
         continue;
       EXPECT_EQ(allocations_when_warm(entry, in_float), "") << entry.info.id << " on " << name << ", float";
-      // Differences of doubles near zero and of their margins have more bits than exact numbers hold in
-      // place: the few moments of the list that are decided at the last stage allocate.
+      // Differences of doubles near zero and of their margins have more bits than exact numbers store in
+      // place: the few instants of the list that are decided at the last stage allocate.
       if (entry.info.id == "kinetic_separation_list") continue;
       EXPECT_EQ(allocations_when_warm(entry, in_double), "") << entry.info.id << " on " << name << ", double";
     }
@@ -278,8 +278,8 @@ TEST(Allocation, NoneByRotationsOnceWarm) {
   EXPECT_EQ(spent, 0u);
 }
 
-/// The allocations of 2,000 random exchanges in a wide hierarchy, with new boxes, in the second of two equal
-/// rounds.
+/// Returns the allocations of 2,000 random exchanges in a wide hierarchy, with new boxes, in the second of
+/// two equal rounds.
 template <class S>
 std::uint64_t allocations_of_exchanges(const BuilderConfig& config) {
   const auto test = synthetic_scene<S>("sheets", 7);
@@ -326,14 +326,14 @@ TEST(Allocation, NoneByExchangesInWideNodesOnceWarm) {
       }
 }
 
-/// Bytes of the heap in use.
+/// Returns the bytes of the heap in use.
 std::size_t heap_bytes() {
   const struct mallinfo2 info = mallinfo2();
   return info.uordblks + info.hblkhd;
 }
 
-/// What a strategy says that it holds, over what the heap has grown by for it, after a clip that was played
-/// twice on two grids of 4,608 triangles that wave through each other.
+/// Returns the memory that a strategy reports, divided by the growth of the heap for it, after a clip that
+/// was played twice on two grids of 4,608 triangles that wave through each other.
 template <class S>
 double declared_over_held(const StrategyEntry& entry) {
   const auto wave = [](std::uint32_t i) { return 0.1 * double(i % 5) - 0.2; };
@@ -370,7 +370,7 @@ TEST(Allocation, BytesAreWhatIsHeld) {
   for (const StrategyEntry& entry : registry()) {
     if (entry.info.max_primitive_pairs != 0) continue;
     SCOPED_TRACE(entry.info.id);
-    // Of a peer's own structures some are not accessible.
+    // Some of a peer's own structures are not accessible.
     const double least = entry.info.topology.own ? 0.8 : 0.9;
     const auto check = [&](double share) {
       EXPECT_GE(share, least) << "it holds more than it says";

@@ -1,5 +1,5 @@
-// What `auto` chooses where the choice is clear, that it says so, and that it answers like everybody else
-// while it changes its mind.
+// The choices of `auto` in clear cases, that it reports them, and that it answers like all others while it
+// changes its choice.
 
 #include <gtest/gtest.h>
 
@@ -18,7 +18,7 @@ namespace {
 
 constexpr auto slow = [](std::uint32_t i) { return 0.02 + 0.001 * i; };
 
-/// Plays frames of one length over the clip of two keyframe intervals, next to a refit.
+/// Plays frames of one length over the clip of two keyframe intervals, alongside a refit.
 template <class S, class AtFrame>
 std::string chosen(const Scene<S>& scene, int frames, AtFrame&& at_frame) {
   Play<S> play(scene, "auto", {}), refit(scene, "bottom_up", {});
@@ -52,6 +52,33 @@ TEST(Auto, DoesNotJoinWithOneFrameForASegment) {
   EXPECT_EQ(choice.find("interval_join"), std::string::npos) << choice;
 }
 
+// Two sheets of unit size and 0.1 apart, where numbers are 0.06 apart: boxes linear in time overlap nearly
+// all others, and a whole join would list millions of pairs.
+TEST(Auto, GivesUpAJoinWithoutEnd) {
+  constexpr std::uint32_t side = 32;
+  Scene<float> scene;
+  for (int b = 0; b < 2; ++b)
+    scene.bodies.push_back(
+        placed_grid<float>(side, 3, [&](std::uint32_t k, std::uint32_t i, std::uint32_t j, int axis) {
+          const double at = axis == 2 ? 0.2 * b : (axis == 0 ? i : j) / double(side) + 0.1 * b * k;
+          return 1e6 + at;
+        }));
+  scene.pairs = all_pairs(scene.bodies);
+  constexpr int frames = 80;
+  Play<float> play(scene, "auto", {}), refit(scene, "bottom_up", {});
+  for (int f = 1; f <= frames; ++f)
+    for (Play<float>* one : {&play, &refit}) one->frame(2.0 * f / frames);
+  const std::uint64_t tests = play.session.strategy().counters()[Counter::box_tests],
+                      of_refit = refit.session.strategy().counters()[Counter::box_tests],
+                      leaves = 2 * (2 * side * side / 16);
+  const std::string choice = play.session.strategy().choice();
+  EXPECT_LE(tests, 20 * (of_refit + frames * leaves)) << choice << ", refit: " << of_refit;
+  EXPECT_LE(play.session.strategy().bytes(), 16U << 20) << choice;
+  Play<float> join(scene, "interval_join", {});
+  join.frame(2.0 / frames);
+  EXPECT_GT(join.session.strategy().counters()[Counter::box_tests], tests) << "the scene is too easy";
+}
+
 TEST(Auto, DoesNotJoinWherePlansChangeAtEveryFrame) {
   const Scene<double> scene = grids<double>(20, 0.3, slow);
   std::uint32_t vertex = 0;
@@ -69,7 +96,7 @@ TEST(Auto, DoesNotJoinWherePlansChangeAtEveryFrame) {
   EXPECT_NE(choice.find("plans changed at 1 of frames"), std::string::npos) << choice;
 }
 
-/// Plays a clip of `l` frames for each keyframe interval, next to a refit.
+/// Plays a clip of `l` frames for each keyframe interval, alongside a refit.
 std::string chosen_at_keyframes(const Scene<float>& scene, int frames, int l = 1) {
   Play<float> play(scene, "auto", {}), refit(scene, "bottom_up", {});
   for (int f = 1; f <= frames; ++f) {
@@ -118,7 +145,7 @@ TEST(Auto, RebuildsTreesThatAgeByRaysAlone) {
 
 TEST(Auto, LeavesAJoinWhoseTreesHaveAged) {
   const std::string choice = chosen_at_keyframes(flying_triangles(4000, 40, Flight::anywhere), 390, 10);
-  EXPECT_GT(frames_of(choice, "interval_join"), 0) << choice;  // in trees that are young
+  EXPECT_GT(frames_of(choice, "interval_join"), 0) << choice;  // while trees are young
   EXPECT_GT(frames_in_new_trees(choice), 200) << choice;
 }
 
@@ -135,14 +162,14 @@ TEST(Auto, DoesNotRebuildTreesThatStayYoung) {
 }
 
 TEST(Auto, LeavesSlabsThatDoNotPay) {
-  // Where nothing is connected, a pair of leaves holds few candidates that a slab could leave out.
+  // Where nothing is connected, a pair of leaves has few candidates that a slab could leave out.
   const std::string choice = chosen_at_keyframes(flying_triangles(2000, 50, Flight::outwards, 0.1), 49);
   EXPECT_LE(frames_of(choice, "leaf_slabs"), 1) << choice;
   EXPECT_GE(frames_of(choice, "bottom_up"), 48) << choice;
 }
 
-/// A search with some box tests.
-struct Told final : TellsWork {
+/// A search with a given number of box tests.
+struct Told final : ReportsWork {
   explicit Told(std::uint64_t box_tests) : tests(box_tests) {}
   std::uint64_t last_box_tests() const override { return tests; }
   std::uint64_t tests;
@@ -155,11 +182,11 @@ TEST(ObservedSlabs, CompareTwoFramesInARow) {
   slabs.start_over(true, seen);
   slabs.prepare_choice(0, seen);
   EXPECT_EQ(plain_cost(seen), std::numeric_limits<double>::infinity()) << "nothing is known";
-  // Without slabs it may be faster, and is tried.
+  // Without slabs it may be faster, so it is tried.
   slabs.slabs(100, Told(10000), true, 1, seen);
   slabs.prepare_choice(1, seen);
   EXPECT_LT(plain_cost(seen), refit_cost(seen));
-  // It finds that slabs leave out 29 of 30 candidates.
+  // The trial shows that slabs leave out 29 of 30 candidates.
   slabs.plain(3000, Told(9000), true, 2, seen);
   EXPECT_EQ(seen.candidates, 100);
   EXPECT_EQ(seen.boxed, 30);
@@ -167,12 +194,12 @@ TEST(ObservedSlabs, CompareTwoFramesInARow) {
   EXPECT_GT(plain_cost(seen), refit_cost(seen));
   EXPECT_TRUE(seen.plain_known);
   EXPECT_GT(sorted_cost(seen), plain_cost(seen)) << "new trees have no slabs";
-  // Half of the candidates and of the box tests, also with slabs.
+  // Half of the candidates and of the box tests, with slabs, too.
   slabs.plain(1500, Told(4500), true, 3, seen);
   EXPECT_EQ(seen.candidates, 50);
   EXPECT_EQ(seen.plain_tests, 4500);
   EXPECT_EQ(seen.slab_tests, 5000);
-  // The comparison goes out of date, and a frame of leaf_slabs allows the next one.
+  // The comparison becomes outdated, and a frame of leaf_slabs allows the next one.
   for (int choice = 0; choice < 20; ++choice) slabs.prepare_choice(100 + choice, seen);
   EXPECT_EQ(plain_cost(seen), std::numeric_limits<double>::infinity());
   EXPECT_FALSE(seen.plain_known);
@@ -180,7 +207,7 @@ TEST(ObservedSlabs, CompareTwoFramesInARow) {
   slabs.prepare_choice(200, seen);
   EXPECT_FALSE(seen.plain_known) << "hoped";
   EXPECT_LT(plain_cost(seen), refit_cost(seen));
-  // So it does where candidates become many.
+  // It also becomes outdated when candidates become many.
   slabs.plain(150, Told(9000), true, 201, seen);
   slabs.prepare_choice(201, seen);
   EXPECT_LT(plain_cost(seen), refit_cost(seen));
@@ -247,7 +274,7 @@ TEST(ObservedAgeing, ComparesTheTestsPerCandidate) {
   ageing.refitted(50000, 4000, 20, seen);
   ageing.look_at_refitted(20, 20, seen);
   ageing.rebuilt(20000, 1000, 21,
-                 seen);  // bodies have parted: two of five tests, two of five of what is found
+                 seen);  // bodies have parted: two of five tests, and of candidates
   EXPECT_DOUBLE_EQ(seen.aged, 0);
 }
 
@@ -450,8 +477,8 @@ TEST(NestedStrategies, KnowNoMoreOfTheFutureThanTheirOwner) {
       NestedStrategies<float>::create(entry, view, ClipMotion<float>(playback), topologies, params));
 }
 
-// Whatever a join was predicted to cost, it is not chosen again where its counts say that a refit costs less:
-// where bodies meet, and where nothing was seen to meet; in segments of any length.
+// Whatever the predicted cost of a join, it is not chosen again where its counts show that a refit costs
+// less: where bodies meet, and where they did not seem to meet; in segments of any length.
 TEST(Auto, AJoinThatCostsMoreThanARefitIsLeft) {
   for (const double frames : {2.0, 10.0, 30.0, 100.0, 1e4})
     for (const bool near : {false, true})
@@ -468,7 +495,7 @@ TEST(Auto, AJoinThatCostsMoreThanARefitIsLeft) {
         join.joined(times * refit_cost(seen), seen.candidates, 20, seen);
         EXPECT_GT(join_cost(seen), 1.1 * refit_cost(seen))
             << times << " times a refit, " << frames << " frames a segment, near: " << near;
-        // What one segment took does not count for ever.
+        // The measurement of one segment does not count for ever.
         for (int choice = 0; choice < 40; ++choice) join.forget(seen);
         if (frames >= 30) {
           EXPECT_LT(join_cost(seen), refit_cost(seen)) << times << ", " << near;

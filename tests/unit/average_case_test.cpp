@@ -1,5 +1,5 @@
 // Average-case collision detection: the predicted probability that two nodes intersect against the observed
-// frequency, on scenes of several kinds; what a grid of an earlier frame is still worth; and that the
+// frequency, on scenes of several kinds; how much a grid of an earlier frame is still worth; and that the
 // traversal finds everything in descending order of probability. Prints its tables if KBVH_TABLES is set.
 #include <gtest/gtest.h>
 
@@ -74,10 +74,10 @@ struct Calibration {
   }
 };
 
-/// Whether the grids are those of the frame, or of the first keyframe.
+/// Whether the grids are those of the current frame or of the first keyframe.
 enum class Grids : std::uint8_t { current, first };
 
-/// Box tests until the first pair of leaves that meet was reached, summed over frames and pairs of bodies.
+/// Box tests until the first intersecting pair of leaves, summed over frames and pairs of bodies.
 struct FirstHits {
   double by_probability = 0, in_order = 0, cases = 0;
 };
@@ -180,7 +180,7 @@ struct Study {
     }
   }
 
-  /// Looks for the first pair of leaves that meet: the most probable pairs first, and depth first. A pair of
+  /// Searches for the first intersecting pair of leaves: in order of probability, and depth first. A pair of
   /// leaves of 8 counts as 64 tests.
   template <class Meets>
   void find_first(std::uint32_t i, const ProbablePairs<float>::Side& a, const ProbablePairs<float>::Side& b,
@@ -246,10 +246,10 @@ TEST_P(AverageCase, PredictionsOrderAndBound) {
                 name.c_str(), hits.by_probability / hits.cases, hits.in_order / hits.cases, hits.cases);
   EXPECT_GT(cells.pairs(), 500);
   EXPECT_EQ(cells.pairs(), count.pairs());
-  // The order of the traversal has information, and where a node is filled tells more than how much of it.
+  // The order of the traversal is informative, and the place of filled cells more so than their number.
   EXPECT_GT(cells.ranking, 0.75);
   EXPECT_GT(cells.ranking, count.ranking);
-  // Predictions from current grids are lower bounds, but for chance.
+  // Predictions from current grids are lower bounds, up to chance.
   for (const Bin& bin : cells.bins)
     if (bin.count >= 30) {
       EXPECT_GE(bin.observed / bin.count, bin.predicted / bin.count - 0.1);

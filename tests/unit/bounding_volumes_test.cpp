@@ -1,5 +1,5 @@
-// Bounding volumes against rational arithmetic: what they are fitted to is inside, exactly; what shares a
-// point overlaps; a point is outside if and only if it protrudes.
+// Bounding volumes against rational arithmetic: the points to which a volume is fitted are inside, exactly;
+// volumes that share a point overlap; a point is outside if and only if it protrudes.
 
 #include <gtest/gtest.h>
 
@@ -105,8 +105,8 @@ TYPED_TEST(Volumes, ContainTheirChildrenExactly) {
     }
 }
 
-// Two clouds with a common point, or with points on both sides of one another's segments: what is in both,
-// exactly, forbids `false`.
+// Two clouds with a common point, or with points on both sides of one another's segments: any exactly common
+// point forbids `false`.
 TYPED_TEST(Volumes, OverlapWhereTheyShareAPoint) {
   using S = VolumeScalar<TypeParam>;
   Random random(13);

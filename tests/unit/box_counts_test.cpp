@@ -1,4 +1,4 @@
-// Counts of box tests: those of one tree are the same under every strategy that searches it in the same way.
+// Counts of box tests: for one tree they are the same under every strategy that searches it in the same way.
 
 #include <gtest/gtest.h>
 
@@ -13,10 +13,10 @@ namespace {
 
 constexpr auto waves = [](std::uint32_t i) { return 0.1 * std::sin(0.3 * i); };
 
-/// The box tests of the query at t = 0, when every tree is new and every box tight, and at 0.5.
+/// Returns the box tests of the queries at t = 0, when every tree is new and every box tight, and at 0.5.
 std::array<std::uint64_t, 2> box_tests(const std::string& id,
                                        const std::map<std::string, std::string>& params,
-                                       const Scene<float>& scene) {
+                                       const Scene<float>& scene, const Budget& budget = {}) {
   const StrategyEntry& entry = find_strategy(id);
   Session<float> session(scene,
                          {&entry, params, {.method = BuildMethod::median, .width = 8, .leaf_size = 8}});
@@ -27,7 +27,7 @@ std::array<std::uint64_t, 2> box_tests(const std::string& id,
   session.reset(0);
   for (int frame = 0; frame < 2; ++frame) {
     if (frame == 1) session.advance(0.5, times);
-    session.query(pairs, times);
+    session.query(pairs, times, budget);
     const std::uint64_t now = session.strategy().counters()[Counter::box_tests];
     made[std::size_t(frame)] = now - before;
     before = now;
@@ -58,9 +58,8 @@ TEST(BoxCounts, OneTreeOfBoxesTakesTheSameTests) {
   for (const char* const id : with_wide_boxes) EXPECT_EQ(box_tests(id, {}, scene), expected) << id;
 }
 
-// Trees of one leaf: whatever the volume is, only the primitives' boxes are compared, after the roots.
-// Eight-wide layouts, of boxes, spheres and oriented boxes, compare the leaf again as the child of its node,
-// twice.
+// Trees of one leaf: for any volume, only the primitives' boxes are compared, after the roots. Eight-wide
+// layouts, of boxes, spheres and oriented boxes, compare the leaf again as the child of its node, twice.
 TEST(BoxCounts, TwoLeavesTakeTheSameTestsOfPrimitives) {
   const Scene<float> scene = grids<float>(2, 0.2, waves);
   const std::uint64_t primitives = 8 + 8 * 8;
@@ -71,7 +70,7 @@ TEST(BoxCounts, TwoLeavesTakeTheSameTestsOfPrimitives) {
     EXPECT_EQ(box_tests(id, {}, scene)[0], 1 + primitives) << id;
 }
 
-// Bodies far from each other take the test of their roots, of whatever volume.
+// Bodies far from each other cost the test of their roots, for any volume.
 TEST(BoxCounts, RootsApartTakeOneTest) {
   const Scene<float> scene = grids<float>(24, 20, waves);
   std::vector<std::string> ids(std::begin(with_wide_boxes), std::end(with_wide_boxes));
@@ -82,6 +81,21 @@ TEST(BoxCounts, RootsApartTakeOneTest) {
     EXPECT_EQ(box_tests(id, {}, scene), (std::array<std::uint64_t, 2>{1, 1})) << id;
   for (const char* const sides : {"14", "18", "26"})
     EXPECT_EQ(box_tests("kdop", {{"sides", sides}}, scene)[0], 1u) << sides;
+}
+
+// Searches of node pairs one by one stop within one pair of nodes or leaves of their budget, which includes
+// the tests of primitives' boxes.
+TEST(BoxCounts, ABudgetIncludesTheTestsOfPrimitives) {
+  const Scene<float> scene = grids<float>(24, 0.2, waves);
+  for (const char* const id : {"bottom_up_volumes", "kinetic_kdop"}) {
+    const std::uint64_t all = box_tests(id, {}, scene)[1];
+    EXPECT_GT(all, 10000u) << id;
+    for (const std::uint64_t most : {all / 16, all / 4, all / 2}) {
+      const std::uint64_t made = box_tests(id, {}, scene, {most})[1];
+      EXPECT_GE(made, most) << id;
+      EXPECT_LE(made, most + 8 + 8 * 8) << id << ", of " << all;
+    }
+  }
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
-// Builders of 8-wide trees: whatever the primitives are, every one of them lies in one leaf, boxes are as
-// small as they can be, and all instruction sets build the same.
+// Builders of 8-wide trees: for any primitives, each of them lies in exactly one leaf, boxes are as small as
+// possible, and all instruction sets build the same tree.
 
 #include <gtest/gtest.h>
 
@@ -91,7 +91,7 @@ Box<double> box_of(const Input<S>& input, std::uint32_t primitive) {
   return to_double(box);
 }
 
-/// The first violation, or an empty text.
+/// Returns the first violation, or an empty text.
 template <class S>
 std::string check_tree(BuiltTree<S>& tree, const Input<S>& input) {
   std::vector<Box<double>> boxes;
@@ -227,7 +227,7 @@ TYPED_TEST(BuildTest, ImplicitTreesAreFull) {
   }
 }
 
-// Neighbours on the Hilbert curve are neighbours in space, which is not so on the Morton curve.
+// Neighbours on the Hilbert curve are neighbours in space; on the Morton curve they need not be.
 TYPED_TEST(BuildTest, HilbertCurveGoesFromCellToNeighbour) {
   Input<TypeParam> input{"grid", {}, {}};
   for (int x = 0; x < 8; ++x)

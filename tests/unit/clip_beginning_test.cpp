@@ -1,5 +1,5 @@
-// What a clip begins with: nothing that is derived from the motion after the first frame is made before
-// `reset`, and nothing of it survives one. For every strategy that is linked in.
+// The beginning of a clip: nothing that is derived from the motion after the first frame is made before
+// `reset`, and nothing of it survives a reset. For every linked strategy.
 
 #include <gtest/gtest.h>
 
@@ -43,7 +43,7 @@ Scene<float> scene_of(const Motion& motion) {
 }
 
 /// Replaces the keyframes of `scene`, which its sessions share, by those of `other`. (The arrays are not
-/// constant; plans only show them so.)
+/// constant; plans only expose them as constant.)
 void replace_motion(const Scene<float>& scene, const Scene<float>& other) {
   for (std::size_t body = 0; body < scene.bodies.size(); ++body) {
     const FlightPlans<float>&plans = scene.bodies[body].plans, &others = other.bodies[body].plans;
@@ -58,7 +58,7 @@ struct Played {
   std::uint64_t fetched = 0;  ///< positions, from the beginning on
 };
 
-/// Plays a clip as it is timed, and compares every frame with the truth.
+/// Plays a clip as for timing, and compares every frame with the truth.
 Played play(Session<float>& session, const std::vector<double>& frames, Oracle<float>& oracle) {
   Played played;
   PhaseTimes ignored;
@@ -98,7 +98,7 @@ void expect_equal(const Played& found, const Played& fresh, const std::string& w
 TEST(ClipBeginning, NothingOfTheMotionIsKnownBeforeOrLeftFromAnEarlierPlay) {
   const Motion usual{0.03, 0, false}, slow{0.002, 1, true};
   const Scene<float> truth_scene = scene_of(usual);
-  // The first frames rest, so that the first segment begins in a frame, too, whose work is counted.
+  // The first frames rest, so that the first segment also begins in a frame, and its work is counted.
   std::vector<double> frames{-0.5};
   for (const double t : frame_times(truth_scene, 4)) frames.push_back(t);
   Oracle<float> oracle(truth_scene);

@@ -1,5 +1,5 @@
-// What the contract checks on behalf of every strategy: abilities are those of the class, times and counters
-// are the base class's business, limits of parameters and kinds of primitives are data.
+// The checks of the contract on behalf of every strategy: abilities are those of the class; the base class
+// handles times and counters; limits of parameters and kinds of primitives are data.
 
 #include <gtest/gtest.h>
 
@@ -18,7 +18,7 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-/// A strategy that checks nothing and clears nothing itself.
+/// A strategy without any checks or clearing of its own.
 template <class S>
 class Careless : public CountedStrategy<S> {
  public:
@@ -158,7 +158,7 @@ TEST(Contract, WhatAClassCannotDoThrows) {
   made.strategy.advance(0);  // the clock has not moved
 }
 
-// Over the registry: a flag is set if and only if the calls that belong to it are carried out.
+// Over the registry: a flag is set if and only if the corresponding calls succeed.
 TEST(Contract, NoFlagLies) {
   const Scene<float> scene = two_grids();
   const auto refused = [](auto&& call) {
@@ -224,7 +224,7 @@ TEST(Contract, TheBaseClassChecksTimes) {
   const float* const none[] = {nullptr};
   EXPECT_THROW(strategy.swept_pairs(2, 3, none, made.pairs), std::invalid_argument);  // two bodies
   EXPECT_TRUE(strategy.calls.empty());
-  made.pairs = {{0, 1, 1, 2}};  // of a frame before
+  made.pairs = {{0, 1, 1, 2}};  // from an earlier frame
   strategy.changes_at(2, Answer::candidates, made.pairs, ended);
   EXPECT_TRUE(made.pairs.empty());
   strategy.spans(2, 3, spans);
@@ -263,15 +263,14 @@ TEST(Contract, ACounterOfOnesOwnHasANameOfItsOwn) {
   EXPECT_THROW(made.strategy.counters(), std::logic_error);
 }
 
-/// Refits without foresight that are no baselines, each with the reason in a sentence.
+/// Returns refits without foresight that are not baselines, each with the reason in a sentence.
 const std::map<std::string, std::string>& excused_refits() {
-  static const std::map<std::string, std::string>
-      excused;  // none: whoever refits takes part in the denominator
+  static const std::map<std::string, std::string> excused;  // none: every refit takes part in the denominator
   return excused;
 }
 
 /// Returns the ids of refits without foresight that are neither declared baselines nor excused, and of
-/// excuses that no such refit needs.
+/// unnecessary excuses.
 std::vector<std::string> undeclared_refits(const std::vector<StrategyEntry>& entries,
                                            const std::map<std::string, std::string>& excused) {
   std::vector<std::string> found;
@@ -288,10 +287,10 @@ std::vector<std::string> undeclared_refits(const std::vector<StrategyEntry>& ent
   return found;
 }
 
-// A refit that is left out of the best refit flatters everything that is compared with it.
+// Leaving a refit out of the best refit flatters everything that is compared with it.
 TEST(Contract, RefitsAnswerPairsWithinABody) {
   for (const char* id : {"bottom_up", "leaf_slabs"}) EXPECT_TRUE(find_strategy(id).info.can.self_pairs) << id;
-  // Both halves of Registry.SelfPairsAreDeclaredOrRefused have members.
+  // Both halves of Registry.SelfPairsAreDeclaredOrRefused must have members.
   EXPECT_TRUE(std::any_of(registry().begin(), registry().end(),
                           [](const StrategyEntry& entry) { return !entry.info.can.self_pairs; }));
 }
@@ -320,7 +319,7 @@ TEST(Contract, BaselinesAreDeclared) {
                                                  "leaf_slabs", "top_down"}));
 }
 
-// Tables tell the version of a peer, and the instruction set of its code, which may not be kbvh's.
+// Tables show the version of a peer, and the instruction set of its code, which may differ from kbvh's.
 TEST(Contract, PeersStateTheirVersion) {
   std::set<std::string> families;
   for (const StrategyEntry& entry : registry()) {
@@ -376,7 +375,7 @@ TEST(Contract, KindsOfPrimitivesAreChecked) {
 }
 
 // Positions that are handed in, frame by frame, from the caller's arrays: the answers are those of the same
-// positions as keyframes; who has to know the motion beforehand refuses such a scene.
+// positions as keyframes. Strategies that must know the motion beforehand refuse such a scene.
 TEST(Contract, PositionsCanBeHandedIn) {
   const Scene<float> known = two_grids();
   Scene<float> unknown = known;

@@ -1,4 +1,4 @@
-// Topologies, builders, renumbering, oracle, audit, flight plans and playback, each alone.
+// Topologies, builders, renumbering, oracle, audit, flight plans and playback, each on its own.
 
 #include <gtest/gtest.h>
 
@@ -128,7 +128,7 @@ TEST(Oracle, CacheOnDiskIsUsedAndDamageIsIgnored) {
     Oracle<float> oracle(test.scene, folder);
     EXPECT_EQ(oracle.problem().empty(), !damaged) << oracle.problem();
     EXPECT_EQ(oracle.pairs(playback), truth);
-  };  // writes a sound file in the end
+  };  // finally writes a sound file
   expect(false);
   std::filesystem::resize_file(file, size / 2);
   expect(true);
@@ -214,8 +214,8 @@ TEST(FlightPlans, HoldNoNegativeZero) {
 }
 
 TEST(FlightPlans, SeeATranslationWhereStepsDifferByRoundingOnly) {
-  // Two vertices: by (1, 0, -0.5); one of them by an ulp of the other; at rest; by what no float holds; by
-  // different ways.
+  // Two vertices that move: by (1, 0, -0.5); one of them by an ulp more than the other; not at all; by a step
+  // that no float holds; by different steps.
   const float less = std::nextafter(3.0f, 0.0f), tiny = 0x1p-30f;
   FlightPlans<float> plans(2, {0, 1, 2, 3, 4, 5}, {0,    1, 2,   2,        1, 2,    //
                                                    1,    1, 1.5, 3,        1, 1.5,  //
@@ -246,7 +246,7 @@ TEST(FlightPlans, SeeATranslationWhereStepsDifferByRoundingOnly) {
   EXPECT_EQ(plans.translation(0), std::nullopt) << "a plan of its own";
 }
 
-// What a far vertex is rounded by says nothing of the others.
+// The rounding of a far vertex does not affect the others.
 TEST(FlightPlans, AFarVertexHidesNoMotionOfTheOthers) {
   const float far = 1e5f;
   for (const float bend : {0.0f, 0.01f}) {

@@ -1,6 +1,6 @@
-// k-DOPs by SIMD: they contain their points exactly, are looser than the tight ones by the margin of
-// roundings and no more, and their search finds the leaves that a comparison of all finds; with every set of
-// kernels, bit by bit.
+// SIMD k-DOPs: they contain their points exactly, are looser than the tight ones by the margin of roundings
+// and no more, and their search finds the same leaves as a comparison of all; with every set of kernels, bit
+// by bit.
 
 #include "core/families/volumes/dop_hierarchy.hpp"
 
@@ -75,8 +75,8 @@ TEST(DopHierarchy, IsTightButForRoundings) {
   expect_tight_but_for_roundings<double, 26>();
 }
 
-// Without its margin the same kernel loses points: the margin is not for show, and the test above would
-// notice.
+// Without its margin the same kernel loses points: the margin is necessary, and the test above would detect
+// its absence.
 TEST(DopHierarchy, NeedsItsMargin) {
   std::size_t outside = 0;
   for_clouds<float>(37, [&](const std::vector<float>& points, const std::string&, Random&) {

@@ -1,5 +1,5 @@
-// What the conformance suite cannot see of drifting boxes: what they leave out, and that lists of near pairs
-// hold every pair for as long as they are said to.
+// Properties of drifting boxes that the conformance suite cannot check: the work that they leave out, and
+// that lists of near pairs contain every pair for as long as promised.
 
 #include <gtest/gtest.h>
 
@@ -53,7 +53,8 @@ TEST(DriftKernel, EqualsTheIntervalPointByPoint) {
 TEST(DriftBoxes, BodiesFarApartGetOneBoxAFrame) {
   const Scene<float> scene = grids<float>(40, 50, lifted);
   Play<float> play(scene, "drift_boxes", {});
-  EXPECT_EQ(play.frame(0.01)[Counter::bodies_skipped], 1u) << "nobody knows yet, so all vertices are read";
+  EXPECT_EQ(play.frame(0.01)[Counter::bodies_skipped], 1u)
+      << "nothing is known yet, so all vertices are read";
   const std::uint64_t vertices = scene.bodies[0].plans.vertex_count();
   for (int f = 2; f <= 100; ++f) {
     const Counters frame = play.frame(0.01 * f);
@@ -85,7 +86,7 @@ TEST(DriftBoxes, NodesThatAreRefittedAreNotSkipped) {
       int refits = 0;
       for (int f = 1; f <= 40; ++f) {
         const Counters frame = play.frame(0.02 * f);
-        // Two bodies with as many nodes; one rests, and the other is refitted or skipped, too.
+        // Two bodies with equally many nodes; one rests, and the other one is refitted or also skipped.
         const std::uint64_t visited = frame[Counter::nodes_visited], skipped = frame[Counter::nodes_skipped];
         EXPECT_GT(skipped, 0u) << id;
         EXPECT_EQ(visited, visited == 0 ? 0 : skipped) << id << ", " << lists << ", frame " << f;
@@ -96,7 +97,8 @@ TEST(DriftBoxes, NodesThatAreRefittedAreNotSkipped) {
 }
 
 TEST(DriftBoxes, ABodyThatRestsAgainAfterAResetIsWhereItWas) {
-  // So slow that lists of near pairs are kept; the body at rest is shifted by a script, and then it is not.
+  // Slow enough that lists of near pairs are kept; a script first shifts the body at rest, and then no longer
+  // does.
   const Scene<float> scene = grids<float>(20, 0.5, left_side);
   std::vector<double> frames;
   for (int f = 0; f <= 60; ++f) frames.push_back(0.01 * f);
@@ -114,7 +116,7 @@ TEST(DriftBoxes, ABodyThatRestsAgainAfterAResetIsWhereItWas) {
   }
 }
 
-/// Asks for pairs and rays at every frame, and compares the hits with brute force. Returns the number of
+/// Queries pairs and rays at every frame, and compares the hits with brute force. Returns the number of
 /// frames that made no boxes.
 int check_rays(const Scene<float>& scene, const char* id) {
   Session<float> session(scene, {&find_strategy(id), {}, find_strategy(id).info.topology.preferred});
@@ -144,7 +146,7 @@ int check_rays(const Scene<float>& scene, const char* id) {
   return kept;
 }
 
-/// Rays in boxes without a margin that were made at the first frame, at later ones.
+/// Rays at later frames, in boxes without a margin that were made at the first frame.
 template <class S>
 void check_old_boxes(const char* name, std::uint64_t& found) {
   const auto test = synthetic_scene<S>(name);
@@ -177,7 +179,7 @@ void check_old_boxes(const char* name, std::uint64_t& found) {
       near_kernels<S>(active_kernel_set())
           .drift(playback.positions(body), bodies[body].before.data(), view.vertex_count(body), interval);
       bodies[body].drifted_by(interval, 1);
-      bodies[body].near = f + stride < frames.size();  // the last time, only the body's box is known
+      bodies[body].near = f + stride < frames.size();  // at the last frame only the body's box is known
     }
     const std::vector<Ray<S>> rays = rays_at(test.scene, playback, 12, std::uint32_t(f));
     std::vector<RayHit> hits(rays.size());
@@ -202,7 +204,7 @@ TEST(DriftRays, ReadOldBoxesAsFarAsVerticesMoved) {
 }
 
 TEST(DriftBoxes, OldBoxesMoveWithTheRaysThatReadThem) {
-  // Near each other, so that lists are kept; and far apart, so that there is only one box.
+  // Close to each other, so that lists are kept; and far apart, so that there is only one box.
   for (const char* id : {"drift_boxes", "drift_boxes_bounded"}) {
     // Lists for 8 of 25 frames: after each, the cost model refits for 17.
     EXPECT_EQ(check_rays(grids<float>(20, 0.5, left_side), id), 16);
@@ -211,7 +213,7 @@ TEST(DriftBoxes, OldBoxesMoveWithTheRaysThatReadThem) {
 }
 
 TEST(DriftBoxes, ABodyAtRestIsNeverRead) {
-  // Both at rest, and crossing: a plan that changes nothing makes the scene one of bodies that may move.
+  // Both at rest, and crossing: a plan that changes nothing turns the scene into one of bodies that may move.
   const Scene<float> scene = grids<float>(20, 0.5, [](std::uint32_t) { return 0.0; });
   {
     const char* id = "drift_boxes_bounded";
@@ -225,10 +227,10 @@ TEST(DriftBoxes, ABodyAtRestIsNeverRead) {
 }
 
 TEST(DriftBoxes, OneSearchLastsForManyFrames) {
-  // A sheet goes down through another one; the step of a frame is small against a triangle.
+  // A sheet moves down through another one; the step of a frame is small compared with a triangle.
   const Scene<double> scene = grids<double>(30, 0.3, [](std::uint32_t) { return 0.05; });
   for (const char* id : {"drift_boxes", "drift_boxes_bounded"}) {
-    Play<double> play(scene, id, {{"candidates", "listed"}});  // else looking at pairs counts as tests
+    Play<double> play(scene, id, {{"candidates", "listed"}});  // otherwise checks of pairs count as tests
     Play<double> refit(scene, "bottom_up", {});
     int searches = 0;
     for (int f = 1; f <= 100; ++f) {
@@ -243,7 +245,7 @@ TEST(DriftBoxes, OneSearchLastsForManyFrames) {
 }
 
 TEST(DriftBoxes, WhatMovesTogetherStaysListed) {
-  // The same motion for both: nothing closes in, however far they go.
+  // The same motion for both: the bodies never close in, at any distance.
   Scene<float> scene = grids<float>(20, 0.5, lifted);
   scene.bodies[1] = grid<float>(20, 0.5, 0.01, 3, lifted);
   scene.pairs = all_pairs(scene.bodies);

@@ -1,6 +1,6 @@
-// What the conformance suite cannot see of envelope strategies: that both keep the same boxes, however the
-// clip is played, that no frame does the work of a whole segment where it is made ahead, and that bodies that
-// only translate cost none.
+// Properties of envelope strategies that the conformance suite cannot check: both keep the same boxes in
+// whatever order the clip is played, no frame does the work of a whole segment if it is made ahead, and
+// bodies that only translate cost nothing.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -20,8 +20,8 @@ struct Event {
   bool reset;
 };
 
-/// All frames; some of them, at most a few per segment, so that many are jumped over; the clip started over
-/// in the middle, later, earlier, and at a keyframe.
+/// All frames; some of them, at most a few per segment, so that many are skipped; the clip started over in
+/// the middle, later, earlier, and at a keyframe.
 std::vector<std::vector<Event>> ways_to_play(const std::vector<double>& frames,
                                              const std::vector<double>& keyframes) {
   std::vector<std::vector<Event>> ways(3);
@@ -40,7 +40,8 @@ std::vector<std::vector<Event>> ways_to_play(const std::vector<double>& frames,
   return ways;
 }
 
-/// Boxes of both, to the last bit those of a refit, and all pairs, at each frame of each way to play.
+/// Compares the boxes of both with those of a refit to the last bit, and all pairs, at each frame of each
+/// order.
 template <class S>
 void check_same(const TestScene<S>& test, const std::string& name, const BuilderConfig& builder) {
   std::vector<double> frames = test.frames.empty() ? frame_times(test.scene, 7) : test.frames;
@@ -125,7 +126,7 @@ TEST(EnvelopesAhead, NoFrameDoesTheWorkOfAWholeSegment) {
       present.reset(0);
       ahead.reset(0);
       const std::uint64_t size = ahead.session.strategy().audit_view(0)->topology.size();
-      // The sorting of stores has a share of the time to itself; nodes are made in 64 blocks or more.
+      // The sorting of stores has a share of the time to itself; nodes are made in at least 64 blocks.
       const std::uint64_t most = size * 16 / (15 * l) + size / 64 + width + 1;
       std::uint64_t sum = 0, sum_present = 0;
       for (std::uint32_t f = 1; f <= 5 * l; ++f) {
@@ -133,7 +134,7 @@ TEST(EnvelopesAhead, NoFrameDoesTheWorkOfAWholeSegment) {
         const std::uint64_t visited = ahead.frame(t)[Counter::nodes_visited];
         const std::uint64_t at_once = present.frame(t)[Counter::nodes_visited];
         EXPECT_EQ(at_once, f % l == 0 && f < 5 * l ? size : 0u);
-        // Of the first segment, the first frame is that of `reset`, and two slices fall to the next.
+        // In the first segment, the first frame is that of `reset`, and two slices fall to the next frame.
         EXPECT_LE(visited, f == 1 ? 2 * most : most) << "frame " << f << ", l = " << l;
         sum += visited;
         sum_present += at_once;
@@ -157,7 +158,7 @@ TEST(EnvelopesAhead, BodiesThatTranslateNeedNoPass) {
       const std::uint64_t begun = std::min(f / 10, 5u), expected[] = {0, 1, 1, 2, 3, 3};
       EXPECT_EQ(player.last[Counter::bodies_translated], expected[begun]) << id << ", frame " << f;
     }
-    // The passes are those of two segments; the first one's was made by reset.
+    // Counts the passes of two segments; reset made the first segment's pass.
     const std::uint64_t size = player.session.strategy().audit_view(0)->topology.size();
     EXPECT_EQ(player.last[Counter::nodes_visited], 2 * size) << id;
 
@@ -180,7 +181,7 @@ TEST(EnvelopesAhead, AScenesOwnTranslationIsSeenWhereItIsExact) {
     EXPECT_EQ(player.last[Counter::bodies_translated], 4u) << "two bodies, two segments after the first";
     EXPECT_EQ(player.last[Counter::nodes_visited], 0u);
   }
-  // One coordinate of one vertex is the next number: this is no translation any more.
+  // One coordinate of one vertex is the next number, so this is no longer a translation.
   Scene<float> scene = made_of("tt", 200);
   const FlightPlans<float>& plans = scene.bodies[0].plans;
   std::vector<float> positions;

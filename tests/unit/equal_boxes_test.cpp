@@ -1,8 +1,9 @@
-// Boxes that are equal, lie in each other or on a line: no update takes more than nearly linear work. Work is
-// counted, never timed.
+// Boxes that are equal, lie in each other or on a line: every update takes at most nearly linear work. Work
+// is counted, never timed.
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 
@@ -73,7 +74,7 @@ Box<double> box_of(const Triangle& triangle) {
   return box;
 }
 
-/// A body that a scene is made of, and one triangle that is far away, or meets all of it.
+/// The other body: one triangle that is far away, or one that meets all of the first body.
 enum class Other : std::uint8_t { far_away, across };
 
 Scene<float> with_other(Body<float> body, Other other) {
@@ -89,7 +90,7 @@ Scene<float> with_other(Body<float> body, Other other) {
   return scene;
 }
 
-/// n triangles of a shape, which fly along; of its own vertices each, or all of the first one's.
+/// n triangles of a shape that fly along; each with its own vertices, or all with those of the first one.
 enum class Vertices : std::uint8_t { own, shared };
 
 Body<float> flying(const Shape& shape, std::uint32_t n, Vertices vertices) {
@@ -138,7 +139,7 @@ std::vector<Case> cases() {
   return all;
 }
 
-/// Adds up all counts of work; levels and maxima are none.
+/// Adds up all counts of work; excludes levels and maxima.
 std::uint64_t steps(const Counters& counters) {
   std::uint64_t sum = 0;
   for (std::size_t c = 0; c < counters.values.size(); ++c)
@@ -162,9 +163,35 @@ std::uint64_t steps_of_clip(const StrategyEntry& entry, const std::map<std::stri
   return steps(session.strategy().counters());
 }
 
-/// The work on four times as many boxes: n log n and some room; n sqrt n is 8 times as much, n^2 16 times.
+/// The growth of the work for four times as many boxes: n log n with a reserve; n sqrt n grows by 8, n^2 by
+/// 16.
 constexpr double most_growth = 6.5;
 constexpr std::uint32_t few = 1000, many = 4 * few;
+
+/// What a strategy's description says to be quadratic, and which cases these are.
+struct Excuse {
+  const char* id;
+  std::vector<std::string> cases;
+};
+const std::vector<Excuse>& excuses() {
+  static const std::vector<Excuse> list{
+      // each lower end of a box passes each upper end
+      {"kinetic_sweep", {"grows from a point", "shrinks to a point and returns"}},
+      // no node owns a side, and a search for one reads them all
+      {"kinetic_boxtree", {"equal", "points", "one face listed many times"}},
+  };
+  return list;
+}
+bool is_excused(const std::string& id, const std::string& input) {
+  return std::any_of(excuses().begin(), excuses().end(), [&](const Excuse& excuse) {
+    return excuse.id == id && std::count(excuse.cases.begin(), excuse.cases.end(), input) != 0;
+  });
+}
+
+TEST(EqualBoxes, ExcusesAreDescribed) {
+  for (const Excuse& excuse : excuses())
+    EXPECT_NE(about(excuse.id).find("quadratic"), std::string_view::npos) << excuse.id;
+}
 
 TEST(EqualBoxes, EveryUpdateIsNearlyLinear) {
   struct Variant {
@@ -183,14 +210,13 @@ TEST(EqualBoxes, EveryUpdateIsNearlyLinear) {
                          large = with_other(input.body(many), other);
       for (const Variant& variant : variants) {
         const StrategyEntry& entry = find_strategy(variant.id);
-        // Its description says when and why.
-        if (about(entry.info.id).find("quadratic") != std::string_view::npos) {
+        if (is_excused(entry.info.id, input.name)) {
           ++excused;
           continue;
         }
         const std::uint64_t less = steps_of_clip(entry, variant.params, small),
                             more = steps_of_clip(entry, variant.params, large);
-        // What is left out altogether takes no steps.
+        // Work that is left out completely takes no steps.
         EXPECT_LE(double(more), most_growth * double(less) + 1000)
             << variant.id << ", " << input.name << (other == Other::across ? ", met by a triangle" : "")
             << ": " << less << " steps with " << few << " triangles, " << more << " with " << many;
@@ -198,11 +224,11 @@ TEST(EqualBoxes, EveryUpdateIsNearlyLinear) {
       }
     }
   EXPECT_GT(compared, 500u);
-  EXPECT_LE(excused, 2 * 2 * cases().size());  // two strategies
+  EXPECT_EQ(excused, 2 * (2 + 3));
 }
 
-/// Returns the sum over all inner nodes of the primitives below: what a builder reads that splits from the
-/// top.
+/// Returns the sum over all inner nodes of the number of primitives below: the reads of a builder that splits
+/// from the top.
 std::uint64_t primitives_split(const Topology& topology) {
   std::vector<std::uint64_t> below(topology.size(), 0);
   std::uint64_t sum = 0;

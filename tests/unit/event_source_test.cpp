@@ -1,4 +1,5 @@
-// Events, stepped one by one through the contract, do what `advance` does, and are described as they are.
+// Events stepped one by one through the contract have the same effect as `advance`, and are described
+// correctly.
 
 #include <gtest/gtest.h>
 
@@ -31,7 +32,7 @@ std::vector<Box<double>> boxes_of(Session<S>& session) {
   return all;
 }
 
-/// Plays a scene twice, by frames and by events; everything has to be the same.
+/// Plays a scene twice, by frames and by events; all results must be equal.
 template <class S>
 void compare(const StrategyEntry& entry, const std::string& name,
              const std::map<std::string, std::string>& params) {
@@ -59,7 +60,7 @@ void compare(const StrategyEntry& entry, const std::string& name,
     if (f > 0) {
       by_frames.advance(t, times);
       for (;;) {
-        const bool listed = events < 8 || events % 128 == 0;  // the whole queue: that takes time
+        const bool listed = events < 8 || events % 128 == 0;  // lists the whole queue, which takes time
         const auto next = source.next_event();
         ASSERT_EQ(source.next_event_time(), next ? next->time.time : std::numeric_limits<double>::infinity());
         if (listed) {
@@ -148,8 +149,8 @@ TEST(EventSource, SteppingIsAdvancing) {
   }
 }
 
-/// Plays a scene event by event with one queue. Returns the events that change anything, in their order, and
-/// the answers of all frames.
+/// Plays a scene event by event with one queue. Returns the events that change anything, in order, and the
+/// answers of all frames.
 template <class S>
 std::vector<ScheduledEvent<S>> log_of(const StrategyEntry& entry, const TestScene<S>& test,
                                       const std::string& queue, std::vector<PairBuffer>& answers) {
@@ -177,7 +178,7 @@ std::vector<ScheduledEvent<S>> log_of(const StrategyEntry& entry, const TestScen
   return log;
 }
 
-/// What an event does and when, exactly; estimates of the time may differ.
+/// The effect and the exact time of an event; estimates of the time may differ.
 template <class S>
 bool same_event(const ScheduledEvent<S>& a, const ScheduledEvent<S>& b) {
   return a.kind == b.kind && a.body == b.body && a.node == b.node && a.side == b.side &&
@@ -199,7 +200,7 @@ void compare_queues(const std::string& id, const std::string& scene) {
   EXPECT_EQ(answers_a, answers_b);
 }
 
-// With segments the separation list decides pairs by the signs of their gaps, with the AVL tree piece by
+// With segments the separation list decides pairs by the signs of their gaps; with the AVL tree, piece by
 // piece.
 TEST(EventSource, QueuesDoNotChangeTheEventsOfTheSeparationList) {
   for (const char* scene : {"soups", "sheets", "static_obstacle", "four_bodies_own_keyframes", "integer_ties",
@@ -212,14 +213,14 @@ TEST(EventSource, QueuesDoNotChangeTheEventsOfTheSeparationList) {
 
 // ---- The pairs that a separation list watches -------------------------------------------------------------
 
-/// Holds the watched pairs against boxes, trees and answers at the session's time: they form trees of pairs
+/// Compares the watched pairs with boxes, trees and answers at the session's time: they form trees of pairs
 /// whose roots are pairs of roots. Each leaf has one primitive, and no body is paired with itself. Returns
 /// the number of pairs.
 template <class S>
 std::size_t check_watched_pairs(Session<S>& session) {
   using Nodes = std::array<std::uint32_t, 4>;
   const EventSource<S>& source = *session.strategy().events();
-  std::vector<WatchedPair> watched(3);  // old content, which has to go
+  std::vector<WatchedPair> watched(3);  // old content, to be replaced
   source.watched_pairs(watched);
   std::map<Nodes, WatchedPair> pairs;
   std::vector<WatchedPair> open;

@@ -1,4 +1,4 @@
-// What holds for every strategy, whatever it does.
+// Properties of every strategy.
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 namespace kbvh::test::every_strategy_test {
 namespace {
 
-// Only statistics within the library of a peer are left out while an instance is timed.
+// A timed instance leaves out only statistics within a peer's library.
 TEST(EveryStrategy, ATimedInstanceCountsTheSame) {
   const Scene<float> scene = grids<float>(24, 0.2, [](std::uint32_t i) { return 0.1 * std::sin(0.3 * i); });
   std::uint64_t triangle_tests = 0;
@@ -45,7 +45,7 @@ TEST(EveryStrategy, ATimedInstanceCountsTheSame) {
   EXPECT_GT(triangle_tests, 0u);
 }
 
-/// Copies of two grids that cut each other, far apart from the other copies; their pairs alone.
+/// Copies of two grids that cut each other, far from the other copies; only the pairs within a copy.
 Scene<float> couples(std::uint32_t count) {
   Scene<float> scene;
   for (std::uint32_t i = 0; i < count; ++i) {
@@ -57,7 +57,8 @@ Scene<float> couples(std::uint32_t count) {
   return scene;
 }
 
-// A budget is for a frame, not for a pair of bodies. Without one, or with enough, an answer is complete.
+// A budget applies to a frame, not to a pair of bodies. Without one, or with a sufficient one, an answer is
+// complete.
 TEST(EveryStrategy, ABudgetIsForAFrame) {
   const Scene<float> one = couples(1), many = couples(12);
   std::size_t with_budget = 0;
@@ -83,7 +84,7 @@ TEST(EveryStrategy, ABudgetIsForAFrame) {
     EXPECT_TRUE(query(many, unlimited, tests_all, pairs_all).complete()) << entry.info.id;
     EXPECT_EQ(pairs_all, 12 * pairs_one) << entry.info.id;
     if (!entry.info.can.time_budget) {
-      // Those that do not honour a budget answer all the same.
+      // Strategies that do not honour a budget answer in full.
       EXPECT_TRUE(query(many, 1, tests, pairs).complete()) << entry.info.id;
       EXPECT_EQ(pairs, pairs_all) << entry.info.id;
       continue;
@@ -99,7 +100,7 @@ TEST(EveryStrategy, ABudgetIsForAFrame) {
   EXPECT_GT(with_budget, 8u);
 }
 
-// What plans did before a reset is forgotten: the same clip costs the same again.
+// The effects of plans before a reset are forgotten: the same clip costs the same again.
 TEST(EveryStrategy, CountsTheSameAfterAReset) {
   const Scene<float> scene = grids<float>(12, 0.2, [](std::uint32_t i) { return 0.1 * std::sin(1.3 * i); });
   for (const StrategyEntry& entry : registry()) {
@@ -144,14 +145,14 @@ TEST(EveryStrategy, RefusesTimesThatAreNone) {
     session.reset(0);
     session.advance(0.5, times);
     session.query(expected, times);
-    for (const double t : {std::nan(""), infinity, -infinity}) {  // and one that is over:
+    for (const double t : {std::nan(""), infinity, -infinity}) {  // and a time in the past:
       EXPECT_THROW(session.advance(0.25, times), std::invalid_argument) << entry.info.id;
       EXPECT_THROW(session.advance(t, times), std::invalid_argument) << entry.info.id << ", t = " << t;
       EXPECT_THROW(session.reset(t), std::invalid_argument) << entry.info.id << ", t = " << t;
       EXPECT_THROW(session.strategy().advance(t), std::invalid_argument) << entry.info.id << ", t = " << t;
       EXPECT_THROW(session.strategy().reset(t), std::invalid_argument) << entry.info.id << ", t = " << t;
     }
-    session.advance(0.5, times);  // and nothing has happened
+    session.advance(0.5, times);  // and has changed nothing
     session.query(pairs, times);
     EXPECT_EQ(pairs.size(), expected.size()) << entry.info.id;
     found += pairs.size();

@@ -1,5 +1,5 @@
-// The realisers that envelopes and calendars keep: exact on the flight plans at whatever times they are asked
-// for, also where plans change, and the same for every set of kernels.
+// The realisers that envelopes and calendars keep: exact on the flight plans at any requested time, also
+// where plans change, and the same for every set of kernels.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -24,7 +24,7 @@ WideHierarchy<S> hierarchy_of(const Body<S>& body, const BuilderConfig& builder,
   return hierarchy;
 }
 
-/// Sides whose realiser is not exactly the one furthest out of all vertices below, at t.
+/// Counts sides whose realiser is not exactly the furthest of all vertices below, at t.
 template <class S>
 std::uint64_t wrong_sides(const WideHierarchy<S>& hierarchy, const WideRealisers& realisers,
                           const FlightPlans<S>& plans, double t) {
@@ -80,7 +80,7 @@ void check_envelope_at_frames(const std::string& name) {
         envelope.make(hierarchy, realisers, body.plans.keyframe(k), body.plans.keyframe(k + 1), times[k],
                       times[k + 1]);
         const WideRealisers at_begin = realisers;
-        // Times at which events are: exactly, where doubles allow that, and beside them.
+        // Times of events: exactly, if doubles allow that, and next to them.
         std::vector<double> frames{times[k]};
         for (const double part : {0.1, 0.25, 1.0 / 3, 0.5, 0.75, 0.999})
           frames.push_back(times[k] + part * (times[k + 1] - times[k]));
@@ -99,7 +99,7 @@ void check_envelope_at_frames(const std::string& name) {
         envelope.advance(times[k + 1], realisers);
         seen_without += wrong_sides(hierarchy, at_begin, body.plans, times[k + 1]);
       }
-      // Whoever forgets the stores is found out.
+      // A test that forgets the stores must be detected.
       EXPECT_EQ(stores > 0, seen_without > 0) << name;
       EXPECT_EQ(envelope.counts().stores, stores);
     }
@@ -116,7 +116,7 @@ TEST(SegmentEnvelope, IsExactAtAnyFrame) {
 TEST(SegmentEnvelope, NothingIsActiveWhereOrderDoesNotChange) {
   const auto test = synthetic_scene<float>("pure_translation_far");
   const Body<float>& body = test.scene.bodies[0];
-  // The same stored step for all vertices but for rounding: keyframe 0 again, moved by a power of two.
+  // All vertices have the same stored step up to rounding: keyframe 0 again, moved by a power of two.
   std::vector<float> first(body.plans.keyframe(0), body.plans.keyframe(0) + 3 * body.plans.vertex_count());
   std::vector<float> last;
   for (const float x : first) last.push_back(2 * x);
@@ -132,7 +132,7 @@ TEST(SegmentEnvelope, NothingIsActiveWhereOrderDoesNotChange) {
   EXPECT_TRUE(envelope.stores().empty());
 }
 
-/// Triangles that fly about at random, more than fit into a few of the blocks that envelopes are made in.
+/// Triangles that fly about at random: too many for a few of the blocks in which envelopes are made.
 template <class S>
 Body<S> crowd(std::uint32_t triangles, std::uint32_t keyframes) {
   Body<S> body;
@@ -151,7 +151,7 @@ Body<S> crowd(std::uint32_t triangles, std::uint32_t keyframes) {
   return body;
 }
 
-// The next segment's envelope, made in slices while the present one goes on, is the one that is made at once.
+// The next segment's envelope, made in slices during the current segment, equals the one made at once.
 template <class S>
 void check_slices(const Body<S>& body, const BuilderConfig& builder, double slice) {
   WideHierarchy<S> hierarchy = hierarchy_of(body, builder);
@@ -234,7 +234,7 @@ TEST(SegmentEnvelope, WhatIsMadeAtOnceEndsWhatWasBegun) {
   }
 }
 
-// Frames as they come: some close together, some far apart; changes of plans at some of them.
+// Frames at uneven distances; plans change at some of them.
 template <class S>
 void check_calendar(const std::string& name) {
   const auto test = synthetic_scene<S>(name, 7);
@@ -284,7 +284,7 @@ TEST(CalendarTree, IsExactAtAnyFrame) {
   }
 }
 
-// One vertex of many gets another velocity: what is looked at are the sides of its leaves and those above.
+// One vertex of many gets another velocity: only the sides of its leaves and those above are checked.
 TEST(CalendarTree, ChangesOfPlansAreLocal) {
   Body<double> body;
   std::vector<double> positions;
@@ -347,7 +347,8 @@ void check_kernels() {
       }
       for (std::uint32_t node = 0; node < plain.topology().size(); ++node)
         ASSERT_EQ(plain.box(node), other.box(node)) << name(set) << ", node " << node;
-      // At another keyframe some realisers have lost their sides: those whose value is not the box's.
+      // At another keyframe some realisers no longer realise their sides: those whose value differs from the
+      // box's.
       std::vector<std::uint64_t> lost(other.node_count());
       const S* later = body.plans.keyframe(1);
       kernels.check(builder.width)(other.arrays(), realisers.data(), later, lost.data(), 0,

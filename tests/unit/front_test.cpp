@@ -1,5 +1,5 @@
 // Fronts give the pairs of a fresh traversal after any jump in time, for every width and set of kernels, and
-// hold what a fresh traversal visits, so that they shrink when bodies part.
+// contain the nodes that a fresh traversal visits, so that they shrink when bodies part.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -97,7 +97,7 @@ TYPED_TEST(FrontTest, EqualsATraversalAfterAnyJump) {
             const auto expected = bodies.traversed(), own = bodies.tracked(), again = bodies.tracked();
             ASSERT_EQ(own.pairs, expected.pairs) << name << ", width " << width << ", leaves of " << leaf;
             ASSERT_EQ(again.pairs, expected.pairs) << name << ", width " << width << ", leaves of " << leaf;
-            // What is visited again is what a traversal visits.
+            // A restarted front visits what a traversal visits.
             ASSERT_EQ(again.tests, expected.tests) << name << ", width " << width << ", leaves of " << leaf;
             found += own.pairs.size();
           }

@@ -1,4 +1,4 @@
-// The garment scenes: counts, determinism, and that cloth stays whole, off the figure's inside, and on it.
+// The garment scenes: counts, determinism, and that cloth stays whole, outside of the figure, and on it.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -29,7 +29,7 @@ GarmentConfig small(GarmentKind kind) {
   return config;
 }
 
-/// Simulated once for all tests that only look.
+/// Simulated once for all tests that only read it.
 const std::vector<io::AnimatedMesh>& small_scene(GarmentKind kind) {
   static const std::vector<io::AnimatedMesh> scenes[] = {simulate_garment(small(GarmentKind::shirt)),
                                                          simulate_garment(small(GarmentKind::dress))};
@@ -72,7 +72,7 @@ void expect_sound(const io::AnimatedMesh& mesh, std::size_t keyframes) {
   }
 }
 
-/// Number of edges that have one triangle only; every edge has one or two, and neighbours agree on what is
+/// Counts edges with only one triangle; every edge has one or two, and neighbours agree on which side is
 /// outside.
 std::size_t border_edges(const io::AnimatedMesh& mesh) {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> directed;
@@ -212,7 +212,7 @@ TEST(Garment, ProgressRisesToOne) {
   }
 }
 
-/// What must hold of any garment at every keyframe.
+/// Properties of any garment at every keyframe.
 void expect_worn(const GarmentConfig& config, const io::AnimatedMesh& garment) {
   SCOPED_TRACE(garment.name);
   WalkingFigure figure(config);
@@ -233,14 +233,14 @@ void expect_worn(const GarmentConfig& config, const io::AnimatedMesh& garment) {
       inside += d < -0.0001;
       highest = std::max(highest, p.z);
       lowest = std::min(lowest, p.z);
-      // Nothing is farther from the figure than the skirt is wide.
+      // Nothing is further from the figure than the skirt is wide.
       EXPECT_LT(d, config.kind == GarmentKind::shirt ? 0.20 : 0.45);
     }
-    // Pinched between arm and trunk it may be inside of one of them.
+    // Where it is pinched between arm and trunk it may be inside of one of them.
     EXPECT_GT(deepest, -0.006) << "keyframe " << k;
     EXPECT_LT(inside, garment.vertex_count / 50) << "keyframe " << k;
     EXPECT_GT(touching, garment.vertex_count / 50) << "keyframe " << k;
-    // It hangs from the shoulders, as long as it was made.
+    // It hangs from the shoulders, with its full length.
     const double shoulder = figure.shape().shoulder.z;
     EXPECT_NEAR(highest, shoulder + 0.05, 0.08) << "keyframe " << k;
     EXPECT_GT(lowest, shape.levels.front().z - 0.25) << "keyframe " << k;
@@ -283,7 +283,7 @@ TEST(Garment, GuideHoldsWhatItAverages) {
   double most = 0;
   for (std::size_t v = 0; v < wanted.size(); ++v) most = std::max(most, length(wanted[v] - fine.rest[v]));
   EXPECT_LT(most, 1.5 * coarse.spacing);
-  // A shift of everything is undone, a ripple finer than the coarse squares is mostly left.
+  // A shift of everything is undone; a ripple finer than the coarse squares mostly remains.
   std::vector<Vec> x = wanted;
   for (Vec& p : x) p.z += 0.01;
   guide.hold(x, wanted);
@@ -306,7 +306,8 @@ TEST(Walker, DistanceIsSignedAndNormalsAreItsGradient) {
       const Vec p{0.3 * std::sin(i * 1.1), 0.4 * std::sin(i * 0.7), 0.9 + 0.8 * std::sin(i * 0.37)};
       const auto near = figure.walker().nearest(p, 0.5);
       EXPECT_NEAR(length(near.normal), 1, 1e-9);
-      // Distances change by no more than the way, and along the normal by nearly all of it outside.
+      // Distances change by no more than the displacement, and outside, along the normal, by nearly all of
+      // it.
       const Vec q = p + near.normal * 1e-4;
       EXPECT_LE(std::fabs(figure.walker().nearest(q, 0.5).distance - near.distance), 1.0001e-4);
     }
@@ -325,7 +326,7 @@ TEST(Walker, SkinLiesOnTheSolid) {
       for (std::size_t v = 0; v < skin.vertex_count; ++v) {
         Vec p = at(skin, k, v);
         p.x -= figure.metres_per_second() * t;
-        // Where limbs are joined to the trunk a part's surface lies inside another part.
+        // Where limbs join the trunk, one part's surface lies inside another part.
         const double d = figure.walker().nearest(p, 1.0).distance;
         EXPECT_LT(d, config.skin_bite + 1e-4);
         proud += d > 0.0005;

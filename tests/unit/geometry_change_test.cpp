@@ -1,5 +1,5 @@
-// Insertion and deletion below the strategies: what a scene, its plans and its playback do, what is refused,
-// and how much a kinetic tree repairs.
+// Insertion and deletion below the strategies: their effects on a scene, its plans and its playback, what is
+// refused, and how much a kinetic tree repairs.
 
 #include <gtest/gtest.h>
 
@@ -76,7 +76,7 @@ TEST(GeometryChange, WhatIsWrongIsRefusedAndNothingChanges) {
   const std::uint64_t before = hash(changing.scene());
   for (const Refused& one : cases) {
     Change change = one.change;
-    // Something right before and beside it, which must not happen.
+    // Something right before this one, and right next to it, that must not happen.
     change.removed_primitives.insert(change.removed_primitives.begin(), {1, 7});
     change.vertices.insert(change.vertices.begin(), Change::NewVertex{1});
     try {
@@ -92,7 +92,7 @@ TEST(GeometryChange, WhatIsWrongIsRefusedAndNothingChanges) {
   }
   const PlanChange<double> late{.body = 0, .vertex = 12};
   EXPECT_THROW(changing.check_plans({&late, 1}), std::invalid_argument);
-  // With its primitive a vertex may go.
+  // A vertex may be removed together with its primitive.
   Change last{.removed_primitives = {{0, 0}}, .removed_vertices = {{0, 0}, {0, 1}, {0, 2}}};
   changing.apply(last, playback);
   EXPECT_EQ(changing.scene().bodies[0].primitives.live_count(), 148u);
@@ -116,7 +116,7 @@ TEST(GeometryChange, NewVerticesFollowTheirPlans) {
     EXPECT_EQ(playback.plans(body).keyframed_count(), old);
     for (const double t : {1.25, 1.75, 2.25, 4.25}) {
       playback.seek(t);
-      // Mixed lists, and all at once: the same positions.
+      // Mixed lists and all at once give the same positions.
       const std::vector<std::uint32_t> some{old, 3, 5, old, 7};
       std::vector<float> listed(3 * std::size_t(old + 1), -1), all(3 * std::size_t(old + 1), -2);
       playback.plans(body).evaluate(t, some, listed.data());
@@ -137,7 +137,7 @@ TEST(GeometryChange, TheOracleKnowsWhatHoldsAfterEach) {
     const auto frames = test.frames.empty() ? frame_times(test.scene, 3) : test.frames;
     Oracle<float> oracle(test.scene, {}, hash(test.script));
     std::size_t made = 0, different = 0;
-    for (int round = 0; round < 2; ++round) {  // in the second one, all answers are remembered
+    for (int round = 0; round < 2; ++round) {  // in the second round all answers are remembered
       Playback<float> playback(test.scene);
       ChangingScene<float> changing(test.scene);
       ScriptCursor<float> cursor(&test.script);
@@ -214,8 +214,8 @@ Cost repairs(std::uint32_t side) {
     forest.geometry_changed(playback.time(), view, ClipMotion<float>(playback), body_changes(view, change));
     const std::uint64_t certificates = count[Counter::certificates_made];
     cost.most = std::max(cost.most, certificates);
-    // One side of a node takes one certificate, of a triangle's leaf two; the leaves touched are two, the
-    // nodes above them fewer than `depth` + 2.
+    // One side of a node needs one certificate, that of a triangle's leaf two; two leaves are touched, and
+    // fewer than `depth` + 2 nodes above them.
     EXPECT_LE(certificates, 6 * (2 * 2 + depth + 2)) << "2 x " << side << "^2 triangles";
     return double(certificates);
   };
@@ -250,7 +250,7 @@ TEST(GeometryChange, KineticTreeRepairsLocally) {
     if (side == 8) smallest = cost;
     largest = cost;
   }
-  // 144 times the triangles.
+  // With 144 times as many triangles.
   EXPECT_LT(largest.insertion, 2 * smallest.insertion);
   EXPECT_LT(largest.removal, 2 * smallest.removal);
 }
@@ -266,7 +266,7 @@ std::uint64_t expect_growth_keeps_order(std::string_view kind = {}) {
   EventClock<double> clock({&playback.plans(0), &playback.plans(1)});
   clock.start();
   Queue queue(clock, 10);
-  // As structures do: a choice must not forget this.
+  // Like the structures: a choice must not forget this.
   const std::vector<double> cuts{0, 0.25, 0.5, 0.75, 1};
   if constexpr (requires { queue.split_at(cuts); }) queue.split_at(cuts);
   if constexpr (requires { queue.choose(kind); }) queue.choose(kind);
@@ -278,7 +278,7 @@ std::uint64_t expect_growth_keeps_order(std::string_view kind = {}) {
     for (int i = 0; i < 20; ++i) {
       Event event;
       event.slot = random.below(slots);
-      // Unlike times, in no order.
+      // Different times, in random order.
       event.hint = std::fmod(next_time += 617, 100'003) / 100'003;
       event.begin = 0;
       event.end = 1;
@@ -308,7 +308,7 @@ TEST(GeometryChange, QueuesGrow) {
       {AvlQueue<double>::name, expect_growth_keeps_order<AvlQueue<double>>()},
       {BinaryHeapQueue<double>::name, expect_growth_keeps_order<BinaryHeapQueue<double>>()}};
   EXPECT_EQ(steps.size(), AnyQueue<double>::names().size());
-  // A queue whose kind was chosen compares as often as that kind, and all kinds differ.
+  // A queue whose kind was chosen makes as many comparisons as that kind, and all kinds differ.
   std::set<std::uint64_t> different;
   for (const auto& [kind, compared] : steps) {
     EXPECT_EQ(expect_growth_keeps_order<AnyQueue<double>>(kind), compared) << kind;

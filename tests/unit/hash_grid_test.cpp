@@ -1,5 +1,5 @@
-// The hash grid: against comparing all boxes with all, with every set of kernels, for boxes of like sizes, of
-// very different sizes, flat, equal, far away, and as far apart as numbers reach.
+// The hash grid against comparing all boxes with all, with every set of kernels, for boxes of similar sizes,
+// of very different sizes, flat, equal, far away, and as far apart as numbers allow.
 
 #include <gtest/gtest.h>
 
@@ -13,7 +13,7 @@ namespace {
 
 using Pairs = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
 
-/// `count` segments, of which the first and then every `removed_every`-th one is removed; 0: none.
+/// `count` segments; the first and then every `removed_every`-th one is removed; 0: none.
 Primitives segments(std::uint32_t count, std::uint32_t removed_every) {
   Primitives primitives;
   for (std::uint32_t i = 0; i < count; ++i) primitives.add(std::vector<std::uint32_t>{2 * i, 2 * i + 1});
@@ -39,7 +39,7 @@ struct Segments {
   GridBody<S> body;
 };
 
-/// What boxes look like.
+/// The shapes of the boxes.
 enum class Shape : std::uint8_t { like, sizes, flat, line, equal, points, far_away, extreme, whole };
 
 template <class S>
@@ -98,7 +98,7 @@ TYPED_TEST(HashGridTest, FindsEachPairOnce) {
   using S = TypeParam;
   for (const KernelSet set : supported_kernel_sets())
     for (const double cell : {0.25, 2.0, 30.0}) {
-      HashGrid<S> grid(cell, set);  // one for all: nothing remains of the search before
+      HashGrid<S> grid(cell, set);  // one for all: nothing remains of the previous search
       for (const std::uint32_t count : {1U, 17U, 400U})
         for (int shape = 0; shape <= int(Shape::whole); ++shape) {
           Random random(count + std::uint32_t(shape));

@@ -1,4 +1,4 @@
-// Rays in many bodies: a body behind what all rays have found is neither entered nor made.
+// Rays among many bodies: a body behind the hits of all rays is neither entered nor made.
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@
 namespace kbvh::hidden_bodies_test {
 namespace {
 
-/// Squares of side 2 across the axis z, one body each, at the given heights, and another one far aside.
+/// Squares of side 2 across the axis z, one body each, at the given heights, and another one far to the side.
 template <class S>
 Scene<S> stacked_squares(const std::vector<S>& heights) {
   Scene<S> scene;
@@ -35,7 +35,7 @@ std::vector<Ray<S>> upward_rays(S x) {
   return rays;
 }
 
-/// What calls ask for while they search: the nodes that they have made, by body.
+/// Records the nodes that calls make while they search, by body.
 struct Asked {
   RayBodies bodies;
   std::vector<int> made;
@@ -89,7 +89,7 @@ void check_stacked_squares() {
     std::vector<RayHit> hits;
     const Asked asked = ask_wide(scene, query, rays, hits);
     EXPECT_TRUE(check_hits<S>(scene, playback, query, std::span<const Ray<S>>(rays), hits).holds());
-    // Of two squares in one place both are entered, unless any hit will do.
+    // Of two squares in one place, both are entered, unless any hit suffices.
     const std::uint64_t entered = query == RayQuery::closest ? 2 : 1;
     EXPECT_EQ(asked.bodies.entered, entered);
     EXPECT_EQ(asked.bodies.hidden, 5 - entered);
@@ -133,7 +133,7 @@ TEST(BodiesBehindOthers, AreNeitherEnteredNorMade) {
   check_stacked_squares<double>();
 }
 
-// Rays that pass by the square in front enter the one behind it.
+// Rays that miss the square in front enter the one behind it.
 TEST(BodiesBehindOthers, AreEnteredIfOneRayReachesThem) {
   const auto scene = stacked_squares<float>({1, 2});
   auto rays = upward_rays<float>(0);

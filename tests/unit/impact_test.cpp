@@ -1,5 +1,5 @@
-// The exact test of continuous collision detection against other ways to decide the same: the static triangle
-// test at rational times, and distances in 120 digits at roots that are found by bisection.
+// The exact test of continuous collision detection against other methods: the static triangle test at
+// rational times, and distances in 120 digits at roots that are found by bisection.
 #include "core/continuous/impact.hpp"
 
 #include <gtest/gtest.h>
@@ -72,8 +72,8 @@ Real inner(const Vector& a, const Vector& b) {
 Vector outer(const Vector& a, const Vector& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
-/// For coordinates up to 4: what is not zero at an algebraic time of degree 3 is far larger, and what is zero
-/// is far smaller, for times are known to 110 digits.
+/// For coordinates up to 4: nonzero values at an algebraic time of degree 3 are far larger, and zero values
+/// far smaller, because times are known to 110 digits.
 const Real tiny("1e-45");
 
 Real squared_distance_to_segment(const Vector& p, const Vector& a, const Vector& b) {
@@ -112,8 +112,8 @@ bool touch_at(const Query& query, const Real& t) {
   return s >= 0 && s <= 1 && u >= 0 && u <= 1;
 }
 
-/// c[0] + c[1] t + c[2] t^2 + c[3] t^3: roots in [0, 1], found between its extremes; extremes that are as
-/// good as zero are roots. Empty if it is zero everywhere.
+/// c[0] + c[1] t + c[2] t^2 + c[3] t^3: roots in [0, 1], found between its extremes; extremes that are
+/// numerically zero count as roots. Empty if the polynomial is zero.
 std::vector<Real> roots_of(const std::array<Real, 4>& c) {
   const auto at = [&](const Real& t) -> Real { return c[0] + t * (c[1] + t * (c[2] + t * c[3])); };
   std::vector<Real> cuts{0, 1};
@@ -168,8 +168,7 @@ std::optional<Real> first_contact(const Query& query) {
   if (std::any_of(volume.begin(), volume.end(), [](const Real& c) { return abs(c) > tiny; })) {
     add(volume);
   } else {
-    // Always in one plane: everything can only change where some three points are in line, or two coordinates
-    // agree.
+    // Always in one plane: changes can only occur where three points are in line, or two coordinates agree.
     for (int i = 0; i < 4; ++i)
       for (int j = i + 1; j < 4; ++j) {
         for (std::size_t k = 0; k < 3; ++k)
@@ -189,7 +188,7 @@ std::optional<Real> first_contact(const Query& query) {
 
 // ---- Checks -----------------------------------------------------------------------------------------------
 
-/// The verdict, after everything that must not depend on it was found to agree.
+/// Returns the verdict, after checking that irrelevant changes do not affect it.
 Impact checked_impact(const Query& query) {
   const Impact impact = find_impact(query.kind, query.moving());
   const Impact exact = find_impact_exact(query.kind, query.moving());
@@ -202,7 +201,7 @@ Impact checked_impact(const Query& query) {
     // Both enclose the same instant.
     EXPECT_LE(std::max(impact.begin, exact.begin), std::min(impact.end, exact.end)) << query.text();
   }
-  // The order of corners, ends and edges, and the sense of time make no difference.
+  // The order of corners, ends and edges, and the direction of time make no difference.
   Query other = query;
   if (query.kind == Kind::vertex_face) {
     std::rotate(other.begin + 1, other.begin + 2, other.begin + 4);
@@ -252,7 +251,7 @@ TEST(Impact, VertexAgainstFaceByHand) {
   EXPECT_FALSE(falls(std::nextafter(2.0, 3.0), 2).touches);
   EXPECT_FALSE(falls(-0x1p-1074, 2).touches);
   EXPECT_TRUE(falls(0x1p-1074, 2).touches);
-  // Just at the begin, just at the end, just short of it.
+  // Exactly at the begin, exactly at the end, just short of it.
   const auto from_to = [](double begin, double end) {
     return checked_impact(vertex_face({1, 1, begin}, {1, 1, end}, floor_face, floor_face));
   };
@@ -331,7 +330,7 @@ Query random_query(Random& random, Kind kind, int reach, bool planar, bool rigid
     if (rigid)
       for (std::size_t k = 0; k < 3; ++k) query.end[i][k] = query.begin[i][k] + velocity[second ? 1 : 0][k];
   }
-  // Now and then coincident points.
+  // Sometimes with coincident points.
   if (random.below(4) == 0) query.begin[3] = query.begin[2];
   if (random.below(4) == 0) query.end[3] = query.end[2];
   if (random.below(6) == 0) query.end[1] = query.begin[1];
@@ -360,7 +359,7 @@ TEST(Impact, AgreesWithTheStaticTestAtRationalTimes) {
              d[0][1] * (d[1][0] * d[2][2] - d[1][2] * d[2][0]) +
              d[0][2] * (d[1][0] * d[2][1] - d[1][1] * d[2][0]);
     };
-    // Coincident points were made after the motion, so look whether it still is linear: at a third time.
+    // Coincident points were made after the motion, so check at a third time that it is still linear.
     Point middle[4];
     for (int i = 0; i < 4; ++i)
       for (std::size_t k = 0; k < 3; ++k) middle[i][k] = 2 * query.end[i][k] - query.begin[i][k];
@@ -381,7 +380,7 @@ TEST(Impact, AgreesWithTheStaticTestAtRationalTimes) {
   EXPECT_GT(seen[1], 500);
 }
 
-// Contact at any of these times is contact.
+// A contact at any of these times is a contact.
 TEST(Impact, MissesNothingAtRationalTimes) {
   Random random(42);
   int found = 0;
@@ -420,8 +419,7 @@ TEST(Impact, AgreesWithThemInOnePlaneForAllTime) {
   EXPECT_GT(seen[1], 20);
 }
 
-// Whatever the filter decides, exact arithmetic decides alike: at all sizes, far from the origin, nearly
-// flat.
+// Exact arithmetic confirms every decision of the filter: at all sizes, far from the origin, nearly flat.
 TEST(Impact, FilterNeverDisagreesWithExactArithmetic) {
   Random random(45);
   ImpactStats stats;

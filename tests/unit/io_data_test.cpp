@@ -1,4 +1,4 @@
-// Real files: every sequence, scene and glTF of the shared data folder loads, and what is baked here equals
+// Real files: every sequence, scene and glTF of the shared data folder loads, and the results of baking equal
 // the point caches that others baked from the same glTF files.
 #include <array>
 #include <cmath>
@@ -102,8 +102,8 @@ TEST(IoData, EveryClipOfEveryGltfLoads) {
                {"Fox.glb", "'Fly'", "'Walk'"});
 }
 
-/// Pairs off the vertices of two meshes with equal keyframe counts by their whole trajectories, ignoring
-/// order. Returns the number left without a partner within `tolerance`, and the largest distance among the
+/// Matches the vertices of two meshes with equal keyframe counts by their whole trajectories, in any order.
+/// Returns the number of vertices without a partner within `tolerance`, and the largest distance among the
 /// pairs.
 std::pair<std::size_t, double> match(const AnimatedMesh& a, const AnimatedMesh& b, double tolerance) {
   const double cell = 2 * tolerance;

@@ -1,5 +1,5 @@
-// What a glTF animation does between its keys: turns, splines and steps, followed by keyframes on straight
-// lines.
+// The motion of a glTF animation between its keys: turns, splines and steps, followed by keyframes on
+// straight lines.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -55,7 +55,7 @@ double diagonal(const AnimatedMesh& mesh) {
   return std::hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
 }
 
-/// How far the lines are from the animation itself at many times, in diagonals of the body.
+/// Returns how far the lines are from the animation itself at many times, in diagonals of the body.
 double furthest(const fs::path& file, const AnimatedMesh& mesh) {
   std::vector<double> times;
   const double first = mesh.keyframe_times.front(), last = mesh.keyframe_times.back();
@@ -107,7 +107,7 @@ TEST_F(IoGltfCurves, AStepIsAJump) {
   for (const double t : {1.0, 1.5, 2.0, before_3}) EXPECT_EQ(on_lines(mesh, 0, t)[2], 10) << t;
 }
 
-// A body that unfolds is not held against the point that it was at first.
+// A body that unfolds is not measured by its initial size of a point.
 TEST_F(IoGltfCurves, TheToleranceIsOfTheLargestKey) {
   const auto keyframes = [&](float first) {
     const AnimatedMesh mesh = load_animated_mesh(
@@ -140,7 +140,7 @@ TEST_F(IoGltfCurves, WhatTurnsTooFastIsRefused) {
                {"c.gltf", "4096 keyframes"});
 }
 
-// Two nodes that turn and move below each other, a skin, random keys: never further away than is promised.
+// Two nodes, one below the other, that turn and move, a skin, random keys: never further away than promised.
 TEST_F(IoGltfCurves, RandomAnimationsAreFollowed) {
   std::mt19937 random(7);
   const auto unit = [&] { return float(random() % 2001) / 1000 - 1; };

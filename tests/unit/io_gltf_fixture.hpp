@@ -20,7 +20,7 @@ inline std::string base64_of(const std::string& bytes) {
   return out;
 }
 
-/// A glTF file put together by hand: each accessor gets a buffer view of its own.
+/// A glTF file composed by hand: each accessor gets its own buffer view.
 class GltfBuilder {
  public:
   template <class T>
@@ -54,7 +54,8 @@ class GltfBuilder {
     return accessor_count_++;
   }
 
-  /// `body`: the members beside asset, buffers, bufferViews and accessors. `uri`: empty for a binary chunk.
+  /// `body`: the members in addition to asset, buffers, bufferViews and accessors. `uri`: empty for a binary
+  /// chunk.
   std::string json(const std::string& body, const std::string& uri) const {
     return "{\"asset\":{\"version\":\"2.0\"}," + body +
            ",\"buffers\":[{\"byteLength\":" + std::to_string(buffer_.size()) +
@@ -82,8 +83,8 @@ class GltfBuilder {
   int view_count_ = 0, accessor_count_ = 0;
 };
 
-/// Two triangles with a seam (6 vertices, 4 after welding), on two joints of which the upper, at (0, 1, 0),
-/// turns by 90 degrees about z between 0.5 s and 1.5 s while the lower moves along x in three keys (0.5,
+/// Two triangles with a seam (6 vertices, 4 after welding), on two joints. The upper joint, at (0, 1, 0),
+/// turns by 90 degrees about z between 0.5 s and 1.5 s, while the lower one moves along x in three keys (0.5,
 /// 1, 1.5 s).
 struct BendingStrip {
   GltfBuilder builder;

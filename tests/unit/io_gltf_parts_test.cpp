@@ -62,7 +62,7 @@ TEST_F(IoGltfParts, PointsWithoutTrianglesAreACloud) {
   const AnimatedMesh moving = load(b.json(scene(part, animation(moves))));
   EXPECT_EQ(moving.positions, (std::vector<double>{1, 0, 0, 1, 0, 0, 1, 0, 5, 1, 0, 5}));
   EXPECT_EQ(moving.primitive_vertices,
-            (Ids{1, 0}));  // as its indices say, without vertices that are no point
+            (Ids{1, 0}));  // according to its indices, without vertices that are not points
   const AnimatedMesh beside = load(b.json(scene(solid + "," + cloud + "," + line)));
   EXPECT_EQ(beside.kind, MeshKind::polygons);
   EXPECT_EQ(beside.vertex_count, 3u);

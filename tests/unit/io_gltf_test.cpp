@@ -1,5 +1,5 @@
-// glTF files made by hand: skins, morph targets, interpolation, welding, accessor layouts, and what is wrong
-// with bad ones.
+// glTF files made by hand: skins, morph targets, interpolation, welding, accessor layouts, and the defects of
+// bad files.
 #include <cmath>
 
 #include "experiments/io/gltf.hpp"
@@ -23,7 +23,7 @@ void expect_position(const AnimatedMesh& mesh, std::size_t keyframe, std::size_t
   }
 }
 
-/// Which keyframes are at these times.
+/// Returns the keyframes at these times.
 std::vector<std::size_t> keyframes_at(const AnimatedMesh& mesh, const std::vector<double>& times) {
   std::vector<std::size_t> found;
   for (const double t : times) {
@@ -339,7 +339,7 @@ TEST_F(IoGltf, BrokenContainers) {
   expect_words(error_of(write("t.gltf", "[]")), {"t.gltf", "[]", "object"});
   expect_words(error_of(write("t.gltf", "{}")), {"t.gltf", "asset"});
   expect_words(error_of(write("t.gltf", "{\"asset\":{\"version\":\"2.0\"}}")), {"t.gltf", "no triangles"});
-  // Depth must not overflow a stack.
+  // Deep nesting must not overflow a stack.
   expect_words(error_of(write("t.gltf", std::string(1000000, '['))), {"t.gltf", "JSON", "deeper than 256"});
   expect_words(
       error_of(write("t.gltf", "{\"a\":" + std::string(500000, '[') + std::string(500000, ']') + "}")),

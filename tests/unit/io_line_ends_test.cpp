@@ -1,5 +1,5 @@
-// The same file with other line ends, other comments and names, and numbers that go on in the next line is
-// the same mesh: random texts of OBJ and ASCII PLY, seeded.
+// The same file with other line ends, other comments and names, and numbers continued in the next line is the
+// same mesh: random texts of OBJ and ASCII PLY, seeded.
 #include <random>
 
 #include "io_test_support.hpp"
@@ -36,7 +36,7 @@ class Writer {
     return lines;
   }
 
-  /// The same statements as another program might write them.
+  /// The same statements, as another program might write them.
   std::string varied(const std::vector<std::string>& lines) {
     constexpr const char* between[] = {"# a\\b\\",    "#",     "g one\\two\\", "usemtl m\\",
                                        "o C:\\",      "",      "\t",           "vn 0 0 1",
@@ -145,7 +145,8 @@ TEST_F(IoLineEnds, Ply) {
     ASSERT_EQ(other.notes.size(), over_several > 0 ? 1u : 0u);
     if (over_several > 0) expect_words(other.notes[0], {std::to_string(over_several) + " of its elements"});
     if (HasFailure()) return;
-    // One value less on any line of the body, and one more on another: never read, for they would shift.
+    // One value less on one line of the body and one more on another: never accepted, because values would
+    // shift.
     std::vector<std::string> bad = rows;
     const std::size_t at = writer.below(vertices - 1);
     bad[at].resize(bad[at].find_last_of(' '));

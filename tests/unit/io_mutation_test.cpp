@@ -1,5 +1,5 @@
-// Damaged files: whatever the bytes, a reader either returns a mesh or throws InputError; never anything
-// else. Run under address and undefined-behaviour sanitisers too. Seeded, so that a failure can be repeated.
+// Damaged files: for any bytes, a reader either returns a mesh or throws InputError, and nothing else. Run
+// under address and undefined-behaviour sanitisers, too. Seeded, so that a failure can be repeated.
 #include <random>
 
 #include "experiments/io/validate.hpp"
@@ -8,7 +8,7 @@
 namespace kbvh::io::test::io_mutation_test {
 namespace {
 
-/// More of them for a long run: KBVH_MUTATIONS=10 tries ten times as many.
+/// Returns the number of rounds; KBVH_MUTATIONS=10 makes ten times as many.
 int rounds(int usual) {
   const char* factor = std::getenv("KBVH_MUTATIONS");
   return factor == nullptr ? usual : usual * std::max(1, std::atoi(factor));
@@ -18,7 +18,7 @@ std::string damaged(std::string bytes, std::mt19937& random) {
   const auto below = [&](std::size_t n) { return n == 0 ? 0 : static_cast<std::size_t>(random()) % n; };
   const std::size_t times = 1 + below(3);
   for (std::size_t i = 0; i < times && !bytes.empty(); ++i) {
-    // Half of the hits fall on the start, where headers and JSON lie.
+    // Half of the changes hit the start, where headers and JSON lie.
     const std::size_t at =
         below(2) == 0 ? below(std::min<std::size_t>(bytes.size(), 4096)) : below(bytes.size());
     switch (below(7)) {
@@ -37,7 +37,7 @@ std::string damaged(std::string bytes, std::mt19937& random) {
       case 4:
         bytes.insert(at, bytes.substr(below(bytes.size()), 1 + below(16)));
         break;
-      case 5: {  // another digit where a digit is, so that text stays text and indices go wrong
+      case 5: {  // another digit in place of a digit: the text stays valid, but indices change
         const std::size_t digit = bytes.find_first_of("0123456789", at);
         if (digit != std::string::npos) bytes[digit] = "0123456789-"[below(11)];
         break;
@@ -53,7 +53,7 @@ std::string damaged(std::string bytes, std::mt19937& random) {
 class IoMutation : public IoTest {
  protected:
   /// Loads `bytes` damaged in `tries` ways, saved as `name`, with an optional motion or mesh file that stays
-  /// good.
+  /// intact.
   void attack(const std::string& name, const std::string& bytes, int tries, const fs::path& mesh = {}) {
     int refused = 0;
     for (int seed = 0; seed < tries; ++seed) {
@@ -66,7 +66,7 @@ class IoMutation : public IoTest {
                                   is_gltf ? "0" : "", 0};
         AnimatedMesh result = load_animated_mesh(request);
         ASSERT_GE(result.keyframe_times.size(), 1u);
-        finish(result, file);  // whatever is accepted keeps all promises
+        finish(result, file);  // every accepted mesh keeps all promises
       } catch (const InputError& error) {
         ++refused;
         const std::string message = error.what();

@@ -91,7 +91,7 @@ TEST_F(IoPrimitives, SurfacesGiveControlNets) {
 
   const auto part = loaded(
       write("p.obj", grid(5, 5, "") + "cstype bspline\ndeg 3 2\nsurf 0 .5 1 2" + indices(25) + "\n" + knots));
-  EXPECT_EQ(part.primitive_count(), 1u);  // spans outside the range are not meant
+  EXPECT_EQ(part.primitive_count(), 1u);  // spans outside of the range are excluded
   const auto two = loaded(write("w.obj", grid(5, 5) + "cstype bspline\ndeg 3 2\nsurf 0 1 0 2" + indices(25) +
                                              "\n" + knots + "curv 0 1 1 2\nparm u 0 1\nend\nsurf 0 1 0 2" +
                                              indices(25) + "\n" + knots));
@@ -131,7 +131,7 @@ TEST_F(IoPrimitives, SurfacesThatAreNotKnownAreRefused) {
     all.push_back("s.obj");
     expect_words(error_of(write("s.obj", text)), all);
   }
-  // Without "rat" weights are of no account.
+  // Without "rat" weights are ignored.
   EXPECT_EQ(
       loaded(write("n.obj", grid(5, 5, " 0") + "cstype bspline\ndeg 3 2\n" + surf + knots)).primitive_count(),
       4u);

@@ -1,5 +1,5 @@
 // Files that are valid but unusual, and files that are nearly valid: each surprise in OBJ, PLY and PC2 is
-// read as the format says, noted, or refused with its place.
+// read as the format requires, noted, or refused with its place.
 #include "io_test_support.hpp"
 
 namespace kbvh::io::test::io_surprises_test {
@@ -48,7 +48,7 @@ TEST_F(ObjSurprises, CommentsAndNamesEndWithTheirLine) {
       EXPECT_EQ(mesh.primitive_vertices, plain.primitive_vertices);
       EXPECT_EQ(mesh.notes.empty(), line[0] != 'f') << joined(mesh.notes);
     }
-  // The comment at the end of a face, and of the last line of one that goes on.
+  // A comment at the end of a face, and on the last line of a face that continues.
   EXPECT_EQ(obj(v3 + "f 1 2 3 # a\\b\\\nf 3 2 1\n").primitive_vertices, (Ids{0, 1, 2, 2, 1, 0}));
   EXPECT_EQ(obj(v3 + "f 1 \\\n2 3 # a\\\nf 3 2 1\n").primitive_vertices, (Ids{0, 1, 2, 2, 1, 0}));
 }
@@ -92,7 +92,7 @@ TEST_F(ObjSurprises, LinesBeginWithAWord) {
           {"line 4", "not a statement"});
   refused(v3 + std::string("f 1 2 3\0\n", 9), {"line 4"});
   refused(v3 + "call part.obj\n", {"line 4", "includes another file"});
-  // Every statement that says nothing about polygons is known.
+  // Every statement that does not concern polygons is known.
   EXPECT_TRUE(
       obj("mtllib a b.mtl\nusemap x\nmaplib y\nshadow_obj z\ntrace_obj z\nlod 3\nbevel on\nc_interp on\n"
           "d_interp on\nctech cparm 1\nstech cparma 1 2\no \xC3\xA9\ng a b\ns 1\nmg 1 0.5\nvt 0 0\nvn 0 0 1\n"
@@ -142,7 +142,7 @@ TEST_F(PlySurprises, AnElementMayGoOnInTheNextLines) {
     expect_words(joined(mesh.notes), {"written over several lines"});
   }
   EXPECT_TRUE(load("a.ply", ply(xyz + face, body3 + "3 0 1 2\n")).notes.empty());
-  // A missing value does not shift the others, wherever it is.
+  // A missing value does not shift the others, at any place.
   refused(ply(xyz + face, "0 0 0\n1 0\n0 1 0 5\n3 0 1 2\n"),
           {"line 11, vertex 1", "ends before all its values", "line 12"});
   refused(ply(xyz + face, "0 0 0\n1\n0 0 0 1 0\n3 0 1 2\n"), {"line 11, vertex 1", "ends before"});

@@ -1,5 +1,5 @@
-// OBJ, PLY, PC2, folders of frames, writers and the cache: what they accept, what they refuse, and in which
-// words.
+// OBJ, PLY, PC2, folders of frames, writers and the cache: what they accept, what they refuse, and their
+// messages.
 #include <cmath>
 #include <limits>
 
@@ -371,7 +371,7 @@ TEST_F(IoSave, ObjAndPc2RoundTrip) {
 TEST_F(IoSave, CacheRoundTrip) {
   std::vector<AnimatedMesh> meshes{sample_mesh(), sample_mesh()};
   meshes[0].merged_keyframes = 3;
-  meshes[1].positions[7] = 0.1;  // no float: this one is kept in doubles
+  meshes[1].positions[7] = 0.1;  // not a float: this mesh is stored in doubles
   const fs::path file = folder_ / "c.kbvh";
   save_cache(meshes, file);
   const std::vector<AnimatedMesh> back = load_cache(file);

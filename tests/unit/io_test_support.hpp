@@ -16,7 +16,7 @@ namespace kbvh::io::test {
 
 namespace fs = std::filesystem;
 
-/// A folder of its own for each test, removed afterwards.
+/// A separate folder for each test, removed afterwards.
 class IoTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -37,7 +37,7 @@ class IoTest : public ::testing::Test {
   fs::path folder_;
 };
 
-/// Loads what must be refused; the message.
+/// Loads an input that must be refused; returns the message.
 inline std::string error_of(const LoadRequest& request) {
   try {
     load_animated_mesh(request);
@@ -76,7 +76,7 @@ inline fs::path data_folder() {
     GTEST_SKIP() << "the shared data folder is absent; set KBVH_DATA to run this test"; \
   }
 
-/// The bytes of numbers, as they lie in a file of this machine's (little-endian) order.
+/// Returns the bytes of numbers, in the byte order of this machine (little-endian).
 template <class T>
 std::string bytes_of(const std::vector<T>& numbers) {
   std::string out(numbers.size() * sizeof(T), '\0');

@@ -1,5 +1,5 @@
 // Text files as other systems write them: line ends, byte order marks, UTF-16; JSON that is nested too deep
-// or says a key twice.
+// or repeats a key.
 #include <random>
 
 #include "experiments/io/bytes.hpp"
@@ -45,7 +45,7 @@ TEST_F(IoText, LinesEndInAnyOfThreeWays) {
       EXPECT_EQ(ply.positions, face.positions);
       EXPECT_EQ(ply.primitive_vertices, face.primitive_vertices);
     }
-  // Lines are counted alike, also where one file has several kinds of them.
+  // Lines are counted the same way, even if one file has several kinds of them.
   expect_words(error_of(write("c.obj", "v 0 0 0\rv 1 0 0\r\nv 0 1 0\nf 1 2 9\r")), {"c.obj", "line 4", "9"});
   expect_words(
       error_of(write("c.ply", with_line_ends(ascii_ply, "\r").replace(ascii_ply.size() - 2, 1, "x"))),
@@ -125,7 +125,7 @@ TEST(IoJson, ErrorsNameThePlace) {
   expect_words(json_error(utf16("{}", false)), {"a.json", "UTF-16"});
 }
 
-// Whatever is written is read as it was; whatever is damaged is refused in one sentence.
+// Written texts are read back unchanged; damaged ones are refused in one sentence.
 TEST(IoJson, RandomTextsAreReadOrRefused) {
   std::mt19937 random(1);
   const auto below = [&](unsigned n) { return unsigned(random()) % n; };

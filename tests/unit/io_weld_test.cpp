@@ -1,4 +1,4 @@
-// Vertices that a file stores once per normal or texture coordinate are one vertex, by one rule for all
+// Vertices that a file stores once per normal or texture coordinate become one vertex, by one rule for all
 // formats.
 #include <set>
 
@@ -10,7 +10,7 @@ namespace {
 using IoWeld = IoTest;
 using Ids = std::vector<std::uint32_t>;
 
-/// The six sides of a cube, each with four vertices of its own: 24 for 8 corners.
+/// The six sides of a cube, each with its own four vertices: 24 for 8 corners.
 struct TexturedBox {
   std::vector<float> positions;
   Ids corners;  // of 12 triangles
@@ -119,7 +119,7 @@ TEST_F(IoWeld, OnlyWhatIsTogetherAtRestAndAtEveryKeyframe) {
   EXPECT_EQ(
       load("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 0 0\nv 0 1 9\nv 1 1 0\nf 1 2 3\nf 4 6 5\n").primitive_vertices,
       (Ids{0, 1, 2, 3, 5, 4}));
-  // Zeros are equal whatever their sign.
+  // Zeros of either sign are equal.
   EXPECT_EQ(
       load_animated_mesh(
           {write("z.obj", "v -0 0 0\nv 1 0 0\nv 0 1 0\nv 0 -0 0\nv 2 2 2\nf 1 2 3\nf 4 5 3\n"), "", "", 0})
@@ -128,7 +128,7 @@ TEST_F(IoWeld, OnlyWhatIsTogetherAtRestAndAtEveryKeyframe) {
 }
 
 TEST_F(IoWeld, UnusedVerticesAndPointsStay) {
-  // Vertex 0 is at the place of 1, but no face uses it: the faces go on using 1.
+  // Vertex 0 is at the same place as 1, but no face uses it: the faces still use 1.
   const std::string vertices = "v 0 0 0\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 0\nv 1 1 0\n";
   const AnimatedMesh mesh = load_animated_mesh({write("a.obj", vertices + "f 2 3 4\nf 5 3 6\n"), "", "", 0});
   EXPECT_EQ(mesh.primitive_vertices, (Ids{1, 2, 3, 1, 2, 5}));

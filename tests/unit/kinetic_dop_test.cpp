@@ -1,4 +1,4 @@
-// Kinetic trees over any number of sides: at the exact times of events and at random times every realiser is
+// Kinetic trees with any number of sides: at the exact times of events and at random times every realiser is
 // extremal on the projected plans, in rational arithmetic, and the k-DOPs contain every vertex at its rounded
 // position. Faults seeded into events and margins are found.
 
@@ -145,7 +145,7 @@ class Play {
     const auto w = line(crossing.winner), l = line(crossing.loser);
     return (w[0] - l[0]) / (l[1] - w[1]);
   }
-  /// Where a vertex is on its projected plan, from the definition.
+  /// Returns the place of a vertex on its projected plan, from the definition.
   Rational value(std::uint32_t body, std::uint32_t vertex, const SlabDirection& n, const Rational& t) const {
     const FlightPlans<S>& plans = playback_.plans(body);
     double from = double(t);
@@ -219,7 +219,7 @@ class Play {
       }
     }
   }
-  /// The sides along the axes have the events of the AABB tree.
+  /// Checks that the sides along the axes have the events of the AABB tree.
   void compare_with_boxes() {
     for (std::uint32_t body = 0; body < forest_.size(); ++body)
       for (std::uint32_t node = 0; node < forest_.tree(body).topology().size(); ++node)

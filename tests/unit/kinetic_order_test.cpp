@@ -1,4 +1,4 @@
-// Kinetic sorted lists and the set of overlapping boxes: against comparing all boxes with all, on whole
+// Kinetic sorted lists and the set of overlapping boxes against comparing all boxes with all, on whole
 // numbers, so that many ends are equal at the begin, meet at one time, or stay together.
 
 #include <gtest/gtest.h>
@@ -47,7 +47,7 @@ struct World {
       return pair.first == body_of[a] && pair.second == body_of[b];
     });
   }
-  /// Pairs that overlap must be in the set, and pairs that are apart must not; those that touch may.
+  /// Overlapping pairs must be in the set, pairs that are apart must not, and touching pairs may be.
   void expect_right(int quarter) const {
     for (std::uint32_t a = 0; a < boxes; ++a)
       for (std::uint32_t b = a + 1; b < boxes; ++b) {

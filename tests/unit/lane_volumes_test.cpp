@@ -1,5 +1,5 @@
 // Spheres and oriented boxes in rows of eight lanes: they contain their points exactly, for clouds of every
-// shape and scale, and what touches is found; with every set of kernels, bit by bit.
+// shape and scale, and volumes that touch are found; with every set of kernels, bit by bit.
 
 #include <gtest/gtest.h>
 
@@ -104,7 +104,7 @@ TEST(LaneVolumes, OrientedBoxesAreSound) {
   expect_sound<ObbHierarchy<double>>();
 }
 
-// Axes stay at right angles up to 16 roundings while the points move far from where frames were chosen.
+// Axes stay at right angles up to 16 roundings while the points move far from where the frames were chosen.
 template <class S>
 void expect_orthonormal() {
   Random random(5);

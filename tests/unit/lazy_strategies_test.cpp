@@ -1,4 +1,4 @@
-// What the conformance suite cannot see of strategies that leave work out: that they do leave it out. And the
+// A property of lazy strategies that the conformance suite cannot check: they really leave work out. And the
 // bound on motion that they rely on.
 
 #include <gtest/gtest.h>
@@ -93,7 +93,7 @@ TEST(InflatedLazy, ABodyAtRestGetsAMarginWhenItFirstMoves) {
 }
 
 TEST(InflatedLazy, AFrameMayJumpOverSegments) {
-  // At rest, in motion, at rest again: the speeds at the frames say nothing.
+  // At rest, in motion, at rest again: the speeds at the frames do not reveal this.
   Scene<float> scene = grids<float>(10, 5, lifted);
   std::vector<float> positions;
   for (const double z : {0.0, 0.0, 1.0, 1.0})
@@ -128,8 +128,7 @@ TEST(Hybrid, DisjointBodiesCostOnePassOverTheirVertices) {
     const auto view = *half.session.strategy().audit_view(0);
     std::uint64_t stale = 0;
     for (const std::uint8_t node : view.stale) stale += node;
-    // What was written is the upper part, and nothing else; vertices on the borders of subtrees are read
-    // twice.
+    // Only the upper part was written; vertices on the borders of subtrees are read twice.
     EXPECT_EQ(upper[Counter::values_written], 6 * (view.topology.size() - stale));
     EXPECT_GT(10 * stale, 8 * view.topology.size());
     EXPECT_GE(upper[Counter::vertex_reads], vertices);

@@ -1,4 +1,4 @@
-// What stands in for missing parts of the library does what they do.
+// The replacements for missing parts of the library behave like the originals.
 
 #include "core/base/library_gaps.hpp"
 

@@ -1,5 +1,5 @@
-// What the conformance suite cannot see of bounds over segments: what they leave out, and that work
-// ahead of time is spread.
+// Properties of bounds over segments that the conformance suite cannot check: the work that they leave out,
+// and that work ahead of time is spread.
 
 #include <gtest/gtest.h>
 
@@ -28,7 +28,7 @@ TEST(LinearBounds, BodiesFarApartGetOneBoxASegment) {
   for (const char* id : all_linear)
     for (const Scene<float>* scene : {&bent, &lifted_whole}) {
       Play<float> play(*scene, id, {});
-      // Of the second segment, which begins at the second frame, if nothing is made ahead.
+      // The work of the second segment, which begins at the second frame, if nothing is made ahead.
       const Counters first = play.frame(0.5);
       Counters next = play.frame(1.5);
       const bool ahead = id == all_linear[2];
@@ -110,7 +110,7 @@ TEST(LinearBounds, ASegmentIsNotCutBecauseTheOneBeforeWas) {
 // ---- Translation
 
 /// Two grids that cross: the first one moves by (1/16, 1/64, 0) from keyframe to keyframe. Its coordinates
-/// are multiples of 1/1024, or of nothing in particular, and one vertex is `wrong` in the last keyframe.
+/// are multiples of 1/1024, or arbitrary, and one vertex is `wrong` in the last keyframe.
 Scene<float> crossing(double unit, float wrong) {
   constexpr std::uint32_t n = 16, keyframes = 9;
   Scene<float> scene = grids<float>(n, 0.5, lifted);
@@ -142,7 +142,7 @@ TEST(LinearBounds, BodiesThatMoveAsAWholeHaveTheirBoxesMoved) {
     // The first of eight segments begins with `reset`, which is not counted.
     EXPECT_EQ(play.last[Counter::bodies_translated], 7u) << id;
     EXPECT_EQ(other.last[Counter::bodies_translated], 6u) << id << ": all segments but the last";
-    // Rounding makes moved boxes larger, so that every few segments they are made anew.
+    // Rounding enlarges moved boxes, so they are recomputed every few segments.
     EXPECT_GE(almost.last[Counter::bodies_translated], 3u) << id;
     EXPECT_LT(almost.last[Counter::bodies_translated], 7u) << id;
 
@@ -155,7 +155,7 @@ TEST(LinearBounds, BodiesThatMoveAsAWholeHaveTheirBoxesMoved) {
   }
 }
 
-/// Two waving sheets that lie in each other, with so many keyframes.
+/// Two waving sheets that lie in each other, with the given number of keyframes.
 Scene<float> waves(std::uint32_t n, std::uint32_t keyframes) {
   Scene<float> scene;
   for (const double phase : {0.0, 1.0}) {
@@ -215,7 +215,7 @@ TEST(IntervalJoinAhead, CountsNoBoxesThatItDidNotMake) {
   Play<float> ahead(scene, "interval_join_ahead", restarted), at_once(scene, "interval_join", restarted);
   PlanScript<float>::Step step;
   for (int f = 1; f <= 20; ++f) {
-    // A change at every frame: what has been begun ahead is forgotten.
+    // A change at every frame: work begun ahead is discarded.
     const double t = f / 1024.0;
     step.time = t;
     step.changes = {{.body = 0,
@@ -247,8 +247,8 @@ TEST(IntervalJoinAhead, EqualsTheJoinAtOnceWhateverFramesThereAre) {
   Session<float> at_once(scene, {&find_strategy("interval_join"), {}, {.width = 8, .leaf_size = 4}});
   PairBuffer pairs, expected;
   PhaseTimes times;
-  // Knots met and missed, segments left out, some of them begun ahead; before the clip and after it; frames
-  // without a query; and all over again from its middle.
+  // Knots met and missed, segments skipped, some of them begun ahead; before the clip and after it; frames
+  // without a query; and again from the middle of the clip.
   const std::vector<std::vector<double>> plays{
       {-1, -0.5, 0, 0.1, 0.2, 1, 1.5, 1.9, 2.5, 3.1, 3.2, 5.7, 6.9, 7, 8},
       {0.5, 0.6, 1.1, 4, 4.5, 5, 5, 5.5, 9},

@@ -1,5 +1,5 @@
 // A tree whose subtrees move: sound after every move, with exact boxes; a search finds the best of all
-// places, and its gain is what the move gains; every instruction set finds the same.
+// places, and its gain equals the gain of the move; every instruction set finds the same.
 
 #include "core/families/restructure/moving_tree.hpp"
 
@@ -110,7 +110,7 @@ std::vector<std::uint32_t> nodes_below(const MovingTree<S>& tree, Place place) {
     for (std::uint32_t lane = 0; lane < tree.node(all[i]).count; ++lane) open(all[i], lane);
   return all;
 }
-/// Returns the places to which a child can move: but where it is.
+/// Returns the places to which a child can move, except its current one.
 template <class S>
 std::vector<Place> places(const MovingTree<S>& tree, Place child) {
   const auto below = nodes_below(tree, child);
@@ -134,7 +134,7 @@ std::vector<Place> places(const MovingTree<S>& tree, Place child) {
   }
   return all;
 }
-/// A move that was not searched for. An infinite price of lanes leaves all nodes of more than one child.
+/// A move without a search. An infinite price of lanes keeps all nodes of more than one child.
 template <class S>
 ReinsertionSearch<S> order(Place child, Place to) {
   ReinsertionSearch<S> job{};
@@ -218,7 +218,8 @@ void finds_the_best() {
       Place child = all[soup.random.below(std::uint32_t(all.size()))];
       if (step % 2 == 0) child = outlier(soup.tree);
       if (step % 4 == 3) {
-        // Medians of 64 primitives fill all nodes, and one primitive jumps to another: they need a new node.
+        // Medians of 64 primitives fill all nodes, and one primitive jumps to another, so they need a new
+        // node.
         soup = Soup<S>(64, {.method = BuildMethod::median, .width = 8, .leaf_size = 1}, 100 * seed + step);
         child = place_of(soup.tree, 0);
         soup.jump(0, 1);

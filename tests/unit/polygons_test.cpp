@@ -1,5 +1,5 @@
-// Polygons of more than three corners: how they are cut, that it does not depend on the list, and that the
-// union of the triangles is the polygon by even-odd.
+// Polygons of more than three corners: how they are cut, that the cut does not depend on the list, and that
+// the union of the triangles is the polygon's even-odd region.
 
 #include <gtest/gtest.h>
 
@@ -75,7 +75,7 @@ Rational dot(const Vector& a, const Vector& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/// Checks that all triangles turn with the polygon. Their boundaries add up to that of the polygon, so that a
+/// Checks that all triangles turn with the polygon. Their boundaries add up to that of the polygon, so a
 /// point inside a polygon that winds once lies in one of them, and a point outside in none.
 ::testing::AssertionResult turns_with_the_polygon(const Polygon& polygon, const PolygonCut& cut) {
   const Vector area = area_vector(polygon, polygon.ids);
@@ -205,7 +205,7 @@ TEST(PolygonCut, DependsNeitherOnTheFirstCornerNorOnTheDirection) {
   std::size_t simple = 0, crossing = 0, without_area = 0;
   for (int i = 0; i < 6000; ++i) {
     Polygon made = in_a_plane(random, 4 + random.below(i % 4 == 0 ? 2 : 6), 2 + random.below(6));
-    if (i % 4 == 1)  // corners are repeated, in the list or by their place
+    if (i % 4 == 1)  // corners are repeated, in the list or by position
       for (std::uint32_t& id : made.ids)
         if (random.below(4) == 0) id = random.below(std::uint32_t(made.ids.size()));
     if (i % 4 == 2)  // bent
@@ -255,7 +255,7 @@ TEST(PolygonCut, AwkwardOnesHaveTheirTriangles) {
   EXPECT_FALSE(cutter.cut(line.ids, line.points.data()).crosses);
   EXPECT_GT(cutter.cut(saddle.ids, saddle.points.data()).bent, 0.1);
   expect_cut_once(cutter, {{0, 0, 0, 0, 0}, {1, 2, 3}});
-  // A hole, joined to the outside by an edge that is there twice: corners 0 and 4 are repeated.
+  // A hole, joined to the outside by a doubled edge: corners 0 and 4 are repeated.
   const Polygon hole{{0, 1, 2, 3, 0, 4, 7, 6, 5, 4}, {0, 0, 0, 9, 0, 0, 9, 9, 0, 0, 9, 0,  //
                                                       3, 3, 0, 6, 3, 0, 6, 6, 0, 3, 6, 0}};
   expect_cut_once(cutter, hole);
@@ -344,7 +344,7 @@ TEST(Polygons, MeetAndAreMetByRaysLikeTheirRegions) {
 }
 
 const Points chevron{0, 0, 0, 2, 3, 0, 0, 1, 0, -2, 3, 0};
-/// The same chevron, turned by a corner: 1 is the reflex one.
+/// The same chevron, rotated by one corner: 1 is the reflex corner.
 const Points turned{2, 3, 0, 0, 1, 0, -2, 3, 0, 0, 0, 0};
 const Points post{0, 2, -1, 0.125, 2, 1, -0.125, 2, 1};
 
@@ -366,7 +366,7 @@ TEST(Polygons, OfEveryFirstCornerHaveTheSamePairsAndHits) {
   }
 }
 
-/// A wrong cut must not pass because the oracle uses it, too.
+/// The oracle uses the cut, too, so check that a wrong cut does not pass.
 TEST(Polygons, TheOracleFindsAWrongCut) {
   auto scene = scene_of<float>({polygon(chevron), polygon(post)});
   Playback<float> playback(scene);
@@ -374,7 +374,7 @@ TEST(Polygons, TheOracleFindsAWrongCut) {
   std::vector<RayHit> hits(1), truth(1);
   brute_force_hits<float>(scene, playback, RayQuery::closest, {&ray, 1}, std::span<RayHit>(truth));
   PolygonCuts& cuts = scene.bodies[0].primitives.cuts;
-  cuts.corners = {1, 2, 3, 1, 3, 0};  // as of a fan of corner 1 or 3
+  cuts.corners = {1, 2, 3, 1, 3, 0};  // like a fan of corner 1 or 3
   EXPECT_TRUE(meet(scene, 0, 1));
   EXPECT_TRUE(brute_force_pairs(scene, playback).empty());
   EXPECT_TRUE(sweep_pairs(scene, playback).empty());

@@ -26,9 +26,9 @@ namespace {
 using test::exact;
 using test::Rational;
 
-/// The first parameter of the ray at which it meets the triangle, by definition: the least s of the points
-/// o + s d = a + u (b - a) + v (c - a) with s, u, v >= 0 and u + v <= 1. The least one is a corner of this
-/// set: some of the four conditions hold with equality, and there is one solution.
+/// Returns the first parameter of the ray at which it meets the triangle, by definition: the least s of the
+/// points o + s d = a + u (b - a) + v (c - a) with s, u, v >= 0 and u + v <= 1. The minimum is at a corner of
+/// this set, where some of the four conditions hold with equality and the solution is unique.
 std::optional<Rational> first_meeting(const RayLine& ray, const double* corners) {
   Rational rows[7][4];  // coefficients of s, u, v, and the right side
   for (int axis = 0; axis < 3; ++axis) {
@@ -163,7 +163,7 @@ TEST(RayTriangle, DecidesLikeRationalArithmetic) {
       ASSERT_EQ(order > 0, *truth[0] > *truth[1]) << "kind " << kind << ", case " << i;
     }
   }
-  // The test says something about every branch.
+  // The test covers every branch.
   EXPECT_GT(met, 4000U);
   EXPECT_GT(compared, 500U);
   EXPECT_GT(ties, 50U);
@@ -245,8 +245,8 @@ TEST(RaySearch, OfEqualHitsTheSmallestCounts) {
   EXPECT_EQ(any.hit(), (RayHit{4, 4, 0.5}));
 }
 
-/// Triangles on shared vertices, several times: `sides` lists each face once more with another first corner
-/// and in the other direction, `copies` are bodies with vertices of their own.
+/// Triangles on shared vertices, several times: `sides` lists each face again with another first corner and
+/// in the other direction, `copies` are bodies with their own vertices.
 Scene<float> flat_grid(std::uint32_t n, std::uint32_t sides, std::uint32_t copies) {
   Scene<float> scene;
   for (std::uint32_t copy = 0; copy < copies; ++copy) {
@@ -283,7 +283,7 @@ RayHit hit_by_all(const Scene<float>& scene, const Ray<float>& ray, std::uint32_
   return search.hit();
 }
 
-/// Faces that are met at the same place because they share its corners need no arithmetic.
+/// Faces that a ray meets at the same place because they share its corners need no arithmetic.
 TEST(RaySearch, DecidesFewOfEqualFacesExactly) {
   constexpr std::uint32_t n = 6;
   struct Way {
@@ -325,8 +325,8 @@ TEST(RaySearch, DecidesFewOfEqualFacesExactly) {
 }
 
 /// Triangles over few places, so that many are met at shared corners and edges, equal, degenerate or in the
-/// plane of the ray: the answer is the first in real arithmetic, of several the smallest, in every order, to
-/// the last bit.
+/// plane of the ray: the answer is the first in real arithmetic, among equals the smallest, in every order,
+/// to the last bit.
 TEST(RaySearch, AnswersDoNotDependOnTheOrder) {
   std::uint64_t ties = 0, hits = 0;
   TriangleTestStats stats;
@@ -469,7 +469,7 @@ TEST(WideRays, EveryKernelAnswersLikeAllPrimitivesInDouble) {
 }
 
 /// Boxes and rays of small integers, on some axes in units so small that directions cannot be inverted: each
-/// ray passes through a point of the box of its block, and others pass it by.
+/// ray passes through a point of its block's box, and others miss it.
 template <class S>
 void screen_keeps_rays_that_meet() {
   std::mt19937 random(11);

@@ -1,4 +1,4 @@
-// What approximate refits do to positions and boxes, by every set of kernels, against plain arithmetic.
+// The approximations of positions and boxes, with every set of kernels, against plain arithmetic.
 
 #include <gtest/gtest.h>
 
@@ -52,7 +52,7 @@ void expect_roundings(KernelSet set) {
   const std::vector<S> values = numbers<S>();
   for (const int digits : {8, 24, all - 1}) {
     if (digits >= all) continue;
-    // Every rest of a register, and no number beyond the count.
+    // Every remainder of a register, and no number beyond the count.
     for (const std::size_t count : {values.size() - 1, std::size_t(1), std::size_t(3), std::size_t(17)}) {
       std::vector<S> nearest = values, down = values;
       reduce_kernels<S>(set).nearest(nearest.data(), count, unsigned(all - digits));

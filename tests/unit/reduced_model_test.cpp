@@ -61,7 +61,7 @@ FlightPlans<S> moving(std::uint32_t vertices, std::size_t modes, std::size_t key
   return {vertices, times, positions};
 }
 
-/// Compares positions with the model's, as far as its remainder and roundings allow.
+/// Compares positions with those of the model, up to its remainder and roundings.
 template <class S>
 void expect_bounded(const FlightPlans<S>& plans, const ReducedModel<S>& model) {
   std::vector<S> positions(std::size_t(3) * plans.vertex_count() + 1);

@@ -1,4 +1,4 @@
-// Correct rounding of positions at the frames of clips, where ties abound, against integers, with every
+// Correct rounding of positions at the frames of clips, where ties are frequent, against integers, with every
 // kernel set. KBVH_SLOW=1 checks 10 million values instead of 300,000.
 #include <gtest/gtest.h>
 
@@ -22,7 +22,7 @@ using kbvh::testing_support::is_nearest_even_by;
 using kbvh::testing_support::slow;
 using kbvh::testing_support::with_all_kernels;
 
-/// Pairs of floats for the frames of a clip: what the first stage must decide or leave.
+/// Pairs of floats for the frames of a clip that the first stage must decide or leave open.
 class FramePairs {
  public:
   static constexpr int kinds = 13;
@@ -40,7 +40,7 @@ class FramePairs {
     return x;
   }
 
-  /// f is the fraction of the segment, l the number of frames to a keyframe.
+  /// f is the fraction of the segment, l the number of frames per keyframe.
   void pair(int kind, double f, int l, float& x0, float& x1) {
     const auto few = static_cast<std::int64_t>(below(401)) - 200;
     x0 = static_cast<float>(unit());
@@ -115,7 +115,7 @@ boost::multiprecision::cpp_int whole(double x, int scale) {
   return wide >>= static_cast<unsigned>(-shift);
 }
 
-/// Frames of clips, as people compute them: l to a keyframe, keyframes at odd and even times.
+/// Frames of clips as users compute them: l per keyframe, keyframes at odd and even times.
 TEST(RoundFrames, AreTheExactValuesRounded) {
   const std::uint64_t wanted = slow() ? 10'000'000 : 300'000;
   FramePairs pairs(1729);

@@ -59,7 +59,7 @@ TEST(RoundPositionsChecker, KnowsRightFromWrong) {
   EXPECT_TRUE(is_nearest_even(0x1p-148F, exact(0x1.8p-149)));
 }
 
-/// Pairs of values of one kind, and times that people (and enemies) use.
+/// Pairs of values of one kind, and times that ordinary (and hostile) users choose.
 template <class S>
 class Samples {
  public:

@@ -1,4 +1,4 @@
-// The built-in scenes: counts, closedness, determinism, and that the tablecloth behaves like one.
+// The built-in scenes: counts, closedness, determinism, and that the tablecloth behaves like a tablecloth.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -137,7 +137,7 @@ TEST(Shapes, MotionsAreSoundAndMove) {
   EXPECT_EQ(soup.primitive_count(), 333u);
   EXPECT_EQ(soup.vertex_count, 999u);
   EXPECT_NE(hash(soup.positions), hash(random_soup(333, 5, 2).positions));
-  // A triangle stays near its own place: soup is local, or no tree could separate it.
+  // A triangle stays near its own place: soup is local, otherwise no tree could separate it.
   double longest = 0;
   for (const auto& [a, b] : undirected_edges(soup)) longest = std::max(longest, distance(soup, 1, a, b));
   EXPECT_LT(longest, 0.35);
@@ -247,7 +247,7 @@ TEST(Tablecloth, FallsAndDrapes) {
   EXPECT_EQ(cloth.primitive_count(), 2048u);
   EXPECT_FALSE(bodies[1].moving());
 
-  // Threads and diagonals hold: what is stretched by a tenth is no cloth.
+  // Threads and diagonals hold: cloth must not stretch by a tenth.
   const std::vector<Edge> edges = undirected_edges(cloth);
   const double spacing = config.side / 32, diagonal = spacing * std::sqrt(2.0);
   double least = 10, most = 0;

@@ -24,7 +24,7 @@ Scene<S> crossing_waves() {
 
 /// Two sheets in the plane 3 x + 5 y = 7 z, `far` from the origin: a third of the vertices of the second one
 /// lie exactly in that plane, inside triangles of the first one, and the others below. The plane's normal
-/// cannot be written as S.
+/// cannot be represented in S.
 template <class S>
 Scene<S> touching_sheets(double far) {
   constexpr std::uint32_t n = 24;

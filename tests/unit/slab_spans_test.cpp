@@ -1,5 +1,5 @@
-// Joins with slabs lose no pair of triangles that share a point at a frame of the segment, whatever the leaf
-// size and the set of kernels; slabs of an earlier segment, or of another leaf, lose some.
+// Joins with slabs lose no pair of triangles that share a point at a frame of the segment, for any leaf size
+// and set of kernels; slabs of an earlier segment, or of another leaf, lose some.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -67,8 +67,7 @@ struct Joined {
 
 enum class Fault : std::uint8_t { none, of_the_segment_before, of_another_leaf };
 
-/// Plays a scene and returns the pairs that joins with slabs have lost, and the shares of pairs that they
-/// have left.
+/// Plays a scene and returns the pairs that joins with slabs have lost, and the shares of pairs that remain.
 struct Played {
   std::size_t lost = 0, hits = 0, joined = 0, left = 0;
 };

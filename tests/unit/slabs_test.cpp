@@ -1,6 +1,6 @@
 // Queries with slabs at the leaves lose no pair of triangles that share a point, for every width, leaf size
-// and set of kernels, also where surfaces touch in a tilted plane far from the origin, so that only the slack
-// for rounding keeps them; and slabs that are stale, or of another leaf, lose some.
+// and set of kernels, even where surfaces touch in a tilted plane far from the origin, so that only the slack
+// for rounding keeps them; slabs that are stale, or of another leaf, lose some.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -10,14 +10,14 @@
 #include "core/motion/round_positions.hpp"
 #include "tests/unit/triangle_pairs.hpp"
 
-// What a kernel says of a span has to be what the exact test says of the positions at every frame in it.
+// A kernel's verdict on a span must match the exact test of the positions at every frame in it.
 
 namespace kbvh {
 namespace {
 
 using namespace triangle_pairs;
 
-/// Pairs of triangles at both ends of a segment from 0 to 1, and the spans that are asked about.
+/// Pairs of triangles at both ends of a segment from 0 to 1, and the queried spans.
 template <class S>
 struct Family {
   std::vector<S> coordinates[2];  // [pair][6][4]
@@ -36,7 +36,7 @@ struct Family {
         for (std::size_t c = 0; c < 6; ++c)
           pairs[i].corner[end][c] = coordinates[end].data() + 24 * i + 4 * c;
   }
-  /// As strategies choose it, where positions at the ends are rounded: span_rounding(unit_rounding).
+  /// As strategies choose it for rounded positions at the ends: span_rounding(unit_rounding).
   static constexpr S rounding = 9 * std::numeric_limits<S>::epsilon();
 };
 

@@ -1,5 +1,5 @@
-// Exchanging subtrees in place: the topology stays sound as by its validator, contents go where the edit
-// says, and the work is in proportion to what changed.
+// Exchanging subtrees in place: the validator finds the topology sound, contents go where the edit states,
+// and the work is in proportion to the change.
 
 #include <gtest/gtest.h>
 
@@ -59,7 +59,7 @@ std::pair<std::uint32_t, std::uint32_t> two_places(const Topology& topology, Ran
   }
 }
 
-/// Exchanges two subtrees and holds the outcome against what was there before.
+/// Exchanges two subtrees and compares the result with the former state.
 void swap_and_check(Topology& topology, std::uint32_t primitives, std::uint32_t a, std::uint32_t b,
                     SubtreeSwap& swapping, TopologyEdit& edit) {
   const auto before = primitives_below(topology);
@@ -69,7 +69,7 @@ void swap_and_check(Topology& topology, std::uint32_t primitives, std::uint32_t 
   ASSERT_EQ(check_topology(topology, primitives), "") << a << " and " << b;
   ASSERT_FALSE(topology.perfect);
   ASSERT_LE(edit.moved.size(), most);
-  // Where everything lies now: the moves are a permutation.
+  // The new place of everything: the moves are a permutation.
   std::vector<std::uint32_t> now(topology.size()), from, to;
   for (std::uint32_t node = 0; node < topology.size(); ++node) now[node] = node;
   for (const auto& move : edit.moved) {
@@ -82,7 +82,8 @@ void swap_and_check(Topology& topology, std::uint32_t primitives, std::uint32_t 
   std::sort(to.begin(), to.end());
   ASSERT_EQ(from, to);
   ASSERT_EQ(std::adjacent_find(from.begin(), from.end()), from.end());
-  // Every node has below it what it had, but those above one of the places and not above both.
+  // Every node has the same primitives below as before, except those above one of the places and not above
+  // both.
   const auto after = primitives_below(topology);
   const std::uint32_t at_a = now[a], at_b = now[b];
   ASSERT_EQ(after[at_a], before[a]);
@@ -262,7 +263,7 @@ TEST(Collapse, EditedTreesBecomeWideOnes) {
         ASSERT_EQ(node_of.size(), wide.size());
         for (std::uint32_t node = 0; node < wide.size(); ++node)
           ASSERT_EQ(wide_below[node], below[node_of[node]]);
-        // A node has room left only if all its children are leaves.
+        // A node has space left only if all its children are leaves.
         for (const TopologyNode node : wide.nodes) {
           if (node.is_leaf() || node.count() == width) continue;
           ++narrow;
@@ -277,7 +278,7 @@ TEST(Collapse, EditedTreesBecomeWideOnes) {
 }
 
 TEST(Collapse, OpensTheHeaviestChild) {
-  // Chains to the left: only the weights say which pair of grandchildren comes up.
+  // Chains to the left: only the weights decide which pair of grandchildren comes up.
   Random random(2);
   const Topology binary = random_tree(64, BuildMethod::median, random);
   std::vector<double> weights(binary.size(), 0);

@@ -1,4 +1,4 @@
-// The sweep on one axis: against comparing all boxes with all, with every set of kernels, while boxes move.
+// The sweep on one axis against comparing all boxes with all, with every set of kernels, while boxes move.
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 namespace kbvh::test::sweep_test {
 namespace {
 
-/// `count` segments, of which the first and then every `removed_every`-th one is removed; 0: none.
+/// `count` segments; the first and then every `removed_every`-th one is removed; 0: none.
 Primitives segments(std::uint32_t count, std::uint32_t removed_every) {
   Primitives primitives;
   for (std::uint32_t i = 0; i < count; ++i) primitives.add(std::vector<std::uint32_t>{2 * i, 2 * i + 1});
@@ -25,7 +25,7 @@ template <class S>
 std::vector<std::pair<std::uint32_t, std::uint32_t>> swept(const SortedBoxes<S>& a, const SortedBoxes<S>& b,
                                                            std::uint32_t axis, KernelSet set, bool within) {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
-  std::vector<FoundPair> found(sweep_block);  // the least: it pauses all the time
+  std::vector<FoundPair> found(sweep_block);  // the minimum: it pauses all the time
   SweepJob<S> job{a.side(0), b.side(1), axis, 0, 0, SweepJob<S>::no_block, found.data(), 0, found.size(), 0};
   while (job.next < job.a.count) {
     within ? sweep_kernels<S>(set).one(job) : sweep_kernels<S>(set).two(job);
@@ -61,7 +61,7 @@ TYPED_TEST(SweepTest, FindsEachPairOnce) {
         const std::uint32_t axis = std::uint32_t(round) % 3;
         Boxes<S> boxes[2];
         for (int body = 0; body < 2; ++body) {
-          // Whole numbers: many boxes touch in a face. Little moves from an odd round to the next one.
+          // Whole numbers: many boxes touch in a face. From an odd round to the next one little moves.
           for (S& x : positions[body])
             if (round % 2 == 0 || random.below(20) == 0) x = S(random.below(12));
           order.take(primitives[body], lists[body], positions[body].data(), set);

@@ -1,5 +1,5 @@
-// Local edits of topologies: sound after each of many random operations, never deep for long, and bounded in
-// what they keep.
+// Local edits of topologies: sound after each of many random operations, never deep for long, and with
+// bounded memory.
 
 #include <gtest/gtest.h>
 
@@ -14,7 +14,7 @@
 namespace kbvh::test::topology_edit_test {
 namespace {
 
-/// Primitives of one vertex each, boxes given apart; an edited topology beside boxes kept up to date.
+/// Primitives of one vertex each, with given boxes; an edited topology, and boxes that are kept up to date.
 class Edited {
  public:
   Edited(std::uint32_t count, const BuilderConfig& config, std::uint64_t seed) : random_(seed) {
@@ -39,7 +39,7 @@ class Edited {
     }
     return box;
   }
-  /// Returns how many leaves were laid out anew.
+  /// Returns the number of leaves that were rebalanced.
   std::size_t insert(const Box<double>& box) {
     const std::uint32_t p = add(box);
     const std::uint32_t at = leaf_for(topology_, box, [&](std::uint32_t n) { return node_boxes_[n]; });
@@ -60,7 +60,7 @@ class Edited {
     editor_->remove(topology_, p, edit_);
     refit();
   }
-  /// Moves a random subtree beside a random node; returns whether that is possible.
+  /// Moves a random subtree next to a random node; returns whether that is possible.
   bool move_beside() {
     const std::uint32_t node = any_node(), target = any_node();
     try {
@@ -77,7 +77,7 @@ class Edited {
   std::uint32_t any_primitive() { return living_[random_.below(std::uint32_t(living_.size()))]; }
   std::size_t living() const { return living_.size(); }
 
-  /// What is wrong, or nothing: the exported topology, where primitives are, and sizes.
+  /// Returns the first fault, or nothing: of the exported topology, the primitives' places, or the sizes.
   std::string fault() const {
     std::vector<std::uint32_t> order;
     const Topology exported = compacted(topology_, order);
@@ -153,7 +153,7 @@ TEST(TopologyEdit, StaysSoundOverTenThousandRandomOperations) {
       std::uint32_t most_leaves = edited.editor().leaf_count();
       const std::uint32_t nodes_at_start = edited.topology().size();
       for (int i = 0; i < 10'000; ++i) {
-        // Tides: towards 150 primitives, towards none, and around.
+        // Tides: towards 150 primitives, towards none, and so on.
         const std::uint32_t chance = (i / 500) % 2 == 0 ? 6 : 4;
         if (edited.living() == 0 || (edited.living() < 150 && edited.random().below(10) < chance))
           edited.insert(edited.random_box());
@@ -176,7 +176,8 @@ TEST(TopologyEdit, StaysSoundOverTenThousandRandomOperations) {
     }
 }
 
-// Each box is far from all before it and larger: without balance every insertion would be one level deeper.
+// Each box is far from all earlier ones and larger: without balance every insertion would be one level
+// deeper.
 TEST(TopologyEdit, DepthStaysLogarithmicUnderAdversarialInsertions) {
   Edited edited(1, {.width = 2, .leaf_size = 1}, 5);
   std::size_t relaid = 0;
@@ -195,7 +196,7 @@ TEST(TopologyEdit, DepthStaysLogarithmicUnderAdversarialInsertions) {
   EXPECT_LT(double(relaid), 4.0 * n * std::log2(n));
 }
 
-// A hierarchy that wanders: inserted at one end, removed at the other. Ids and depths must not wander along.
+// A hierarchy that wanders: inserted at one end, removed at the other. Ids and depths must not grow with it.
 TEST(TopologyEdit, NodesAreUsedAgain) {
   Edited edited(0, {.width = 2, .leaf_size = 1}, 6);
   for (std::uint32_t i = 0; i < 3000; ++i) {
@@ -211,7 +212,7 @@ TEST(TopologyEdit, NodesAreUsedAgain) {
   EXPECT_LE(edited.topology().primitives.size(), 2u * 51u);
 }
 
-// A primitive goes and comes back: the tree is as perfect as it was, and said to be.
+// A primitive is removed and inserted again: the tree is as perfect as before, and declared so.
 TEST(Compacted, SaysWhatIsPerfectNow) {
   std::vector<Box<double>> boxes(8);
   for (std::uint32_t i = 0; i < boxes.size(); ++i) {
@@ -275,7 +276,7 @@ TEST(ListPool, KeepsListsApart) {
     for (std::uint32_t k = 0; k < pool.keys(); ++k)
       ASSERT_TRUE(std::equal(pool[k].begin(), pool[k].end(), expected[k].begin(), expected[k].end())) << i;
   }
-  EXPECT_LT(pool.value_count(), 40u * 2 * 64);  // abandoned room is used again
+  EXPECT_LT(pool.value_count(), 40u * 2 * 64);  // abandoned space is used again
   pool.clear();
   EXPECT_EQ(pool.keys(), expected.size());
   for (std::uint32_t k = 0; k < pool.keys(); ++k) EXPECT_TRUE(pool[k].empty());

@@ -25,7 +25,7 @@ namespace {
 
 using namespace triangle_pairs;
 
-/// What stands where a fourth lane reads: nothing may depend on it.
+/// The value at the place of a fourth lane: nothing may depend on it.
 template <class S>
 S padding(std::size_t i) {
   constexpr S values[] = {std::numeric_limits<S>::quiet_NaN(), std::numeric_limits<S>::infinity(),
@@ -55,13 +55,13 @@ void expect_equal(const TriangleTestStats& stats, const TriangleTestStats& expec
   EXPECT_EQ(stats.exact, expected.exact) << set;
 }
 
-/// How a family came out in single tests.
+/// The results of a family in single tests.
 struct Tally {
   std::size_t intersecting = 0, separate = 0;
   TriangleTestStats stats;
 };
 
-/// Every kernel set answers and counts as the single test does.
+/// Every kernel set answers and counts like the single test.
 template <class S>
 Tally check(const std::vector<Pair<S>>& family) {
   const Batch<S> batch(family);
@@ -89,7 +89,7 @@ Tally check(const std::vector<Pair<S>>& family) {
   return tally;
 }
 
-/// And the family shows something: both answers, by filter and exactly.
+/// In addition, the family is meaningful: both answers occur, by the filter and exactly.
 template <class S>
 void check_family(const std::vector<Pair<S>>& family, std::size_t at_least) {
   const Tally tally = check(family);
@@ -194,8 +194,8 @@ TYPED_TEST(TriangleBatch, OneUlpFromDegenerate) {
                500);
 }
 
-/// All of a pair scaled by one power of two: from where coordinates are denormal, through where only products
-/// underflow, to where they overflow in float.
+/// All of a pair scaled by one power of two: from denormal coordinates, through the range where only products
+/// underflow, to the range where they overflow in float.
 TYPED_TEST(TriangleBatch, ScaledThroughTheRange) {
   using S = TypeParam;
   Random random(7);
@@ -226,7 +226,7 @@ TYPED_TEST(TriangleBatch, UpToTheAdmissibleMagnitude) {
                                                          : random_pair<S>(random);
                              stretch(pair, admissible_magnitude<S>);
                              if (i % 3 == 0) perturb(random, pair);
-                             // Away from zero once more, where perturb may have crossed the limit.
+                             // Moves away from zero again, where perturb may have crossed the limit.
                              for (auto& triangle : pair)
                                for (auto& p : triangle)
                                  for (S& x : p)
@@ -236,8 +236,7 @@ TYPED_TEST(TriangleBatch, UpToTheAdmissibleMagnitude) {
                500);
 }
 
-/// Coordinates whose exponents have nothing to do with each other: differences round, some products underflow
-/// while others overflow.
+/// Coordinates with unrelated exponents: differences round, some products underflow while others overflow.
 TYPED_TEST(TriangleBatch, SizesFarApart) {
   using S = TypeParam;
   Random random(9);

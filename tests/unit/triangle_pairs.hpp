@@ -10,7 +10,7 @@
 #include <vector>
 
 // Families of triangle pairs for the tests of the exact triangle test: most of them touch, nearly touch, are
-// coplanar or degenerate, which random ones never are.
+// coplanar or degenerate, unlike random pairs.
 
 namespace kbvh::triangle_pairs {
 

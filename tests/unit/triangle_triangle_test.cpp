@@ -29,7 +29,8 @@ bool test(const Corners<S>& a, const Corners<S>& b, TriangleTestStats* stats = n
                              stats);
 }
 
-/// The answer for the pair as it stands; fails if one of the 72 orders of corners and triangles disagrees.
+/// Returns the answer for the pair as given; fails if one of the 72 orders of corners and triangles
+/// disagrees.
 template <class S>
 bool test_all_orders(const Pair<S>& pair) {
   const bool first = test(pair[0], pair[1]);
@@ -102,7 +103,7 @@ bool intersect(const Pair<S>& pair) {
 
 }  // namespace reference
 
-/// How a family of pairs came out. Families should contain both answers, or they show little.
+/// The results of a family of pairs. A family without both answers would prove little.
 struct Tally {
   int intersecting = 0, separate = 0, wrong = 0;
 };
@@ -153,8 +154,8 @@ void check_labels(const std::string& name, bool expected) {
             EXPECT_EQ(wrong, 0) << path;
             return;
           }
-          // Labels hold for the decimals as written, which are integers after this; those below 2^24 are
-          // floats.
+          // Labels apply to the decimals as written, which are integers after this scaling; those below 2^24
+          // are floats.
           const double integer = std::round(decimal * 1e6);
           ASSERT_NEAR(integer, decimal * 1e6, 1e-6);
           x = S(integer);
@@ -191,7 +192,7 @@ Corners<double> grid_corners(const std::array<int, 3>& triple, int n) {
   return corners;
 }
 
-/// The least of the triples that the cube's 48 symmetries make of this one.
+/// Returns the least of the triples that the cube's 48 symmetries make of this one.
 std::array<int, 3> canonical(const std::array<int, 3>& triple, int n) {
   std::array<int, 3> best = triple;
   std::array<int, 3> axes{0, 1, 2};
@@ -212,8 +213,8 @@ std::array<int, 3> canonical(const std::array<int, 3>& triple, int n) {
   return best;
 }
 
-/// Every pair of triangles, degenerate ones included, with coordinates in {0, 1, 2}, up to the symmetries of
-/// the cube: all cases of sides, apices and contacts that there are.
+/// Every pair of triangles, including degenerate ones, with coordinates in {0, 1, 2}, up to the symmetries of
+/// the cube: all possible cases of sides, apices and contacts.
 TEST(TriangleTriangleExhaustive, GridOfThree) {
   constexpr int n = 3;
   std::vector<reference::Simplex> simplices;
@@ -293,7 +294,7 @@ TYPED_TEST(TriangleTriangle, ScaledToTheEndsOfTheRange) {
       Pair<TypeParam> pair = i % 3 == 0   ? grid_pair<TypeParam>(random, 3)
                              : i % 3 == 1 ? coplanar_pair<TypeParam>(random, 4)
                                           : contact_pair<TypeParam>(random);
-      scale(pair, exponent);  // rounds where it ends in denormals: both sides see the rounded numbers
+      scale(pair, exponent);  // rounds if it results in denormals: both sides get the rounded numbers
       check(pair, tally);
     }
     expect_both(tally, 100);
@@ -315,7 +316,7 @@ TYPED_TEST(TriangleTriangle, FarFromTheOrigin) {
   expect_both(tally, 300);
 }
 
-/// Exponents apart by the whole range: differences round, exact integers grow beyond 512 bits.
+/// Exponents that differ by the whole range: differences round, exact integers grow beyond 512 bits.
 TYPED_TEST(TriangleTriangle, SizesFarApart) {
   Random random(7);
   const int lowest = std::is_same_v<TypeParam, float> ? -149 : -1074;
@@ -408,7 +409,7 @@ TEST(Predicates, SignsAreExact) {
   EXPECT_GT(undecided2d, 1000);
 }
 
-/// Where every product underflows to zero the filter must not answer zero, nor anything else.
+/// Where every product underflows to zero the filter must not answer zero, nor any other sign.
 TEST(Predicates, UnderflowIsLeftToIntegers) {
   const double tiny = std::numeric_limits<double>::denorm_min();
   const Point<double> a{0, 0, 0}, b{tiny, 0, 0}, c{0, tiny, 0}, d{0, 0, tiny};

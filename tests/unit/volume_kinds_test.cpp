@@ -1,4 +1,4 @@
-// What holds for single kinds of bounding volumes: tightness, surfaces, and overlap against the exact truth.
+// Properties of single kinds of bounding volumes: tightness, surfaces, and overlap against the exact truth.
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 namespace kbvh::test::volume_kinds_test {
 namespace {
 
-// Those of fixed directions are tight: from below as from the points.
+// Volumes of fixed directions are tight: fitted to their children as to the points.
 template <class V>
 void expect_tight_from_below() {
   using S = VolumeScalar<V>;
@@ -68,7 +68,7 @@ TEST(Dops, HaveTheirDirections) {
 }
 
 TEST(Dops, SurfaceIsThatOfThePolytope) {
-  // The octahedron is a 14-DOP, and the cube of any kind is a cube if nothing is cut.
+  // The octahedron is a 14-DOP, and the cube of any kind is a cube if nothing is cut off.
   std::vector<double> octahedron, cube, cuboctahedron;
   for (int axis = 0; axis < 3; ++axis)
     for (const double side : {-1.0, 1.0})
@@ -97,7 +97,7 @@ TEST(Dops, SurfaceIsThatOfThePolytope) {
   EXPECT_NEAR(surface_area(dodecahedron), 12 * std::sqrt(2.0) / 2, 1e-12);
 }
 
-// What contains another convex set has the larger surface.
+// A convex set that contains another one has the larger surface.
 TEST(Dops, SurfaceGrowsAsSlabsAreTakenAway) {
   Random random(29);
   for (const Shape shape : {Shape::cloud, Shape::plane, Shape::line, Shape::axis_plane})
@@ -255,7 +255,7 @@ void expect_obbs_overlap_as_they_should(double offset) {
     fit(a, all(points_of<S>(Shape::cloud, {offset, 1}, 3 + random.below(4), random)));
     auto points = points_of<S>(Shape::cloud, {offset, 1}, 3 + random.below(4), random);
     double way[3] = {random.unit(), random.unit(), random.unit()};
-    // Bisects to where they just touch, for half of them; to either side of it.
+    // Bisects to where they just touch, for half of them; for the others, to either side of it.
     double least = 0, most = 4;
     const auto move = [&](double by) {
       auto moved = points;
@@ -314,7 +314,7 @@ TEST(OrientedBoxes, FindASlantedPlate) {
   EXPECT_LT(surface_area(parent), 1.5 * surface_area(plate));
 }
 
-// Rounded axes are not at right angles: thirty levels must not blow a box up.
+// Rounded axes are not at right angles: thirty levels must not inflate a box.
 TEST(OrientedBoxes, GrowLittleFromLevelToLevel) {
   Random random(47);
   Obb<float> child;

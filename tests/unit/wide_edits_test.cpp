@@ -1,5 +1,5 @@
-// The layout of a wide hierarchy whose topology is edited equals one that is laid out anew: by boxes, pairs,
-// box tests, vertices of leaves, and its topology by the validator.
+// The layout of a wide hierarchy whose topology is edited equals a new layout: by boxes, pairs, box tests,
+// vertices of leaves, and its topology by the validator.
 
 #include <gtest/gtest.h>
 
@@ -92,7 +92,7 @@ class Edited {
     hierarchy().refit(positions());
   }
 
-  /// Returns the first difference from a hierarchy that is laid out anew, or nothing.
+  /// Returns the first difference from a new layout, or nothing.
   std::string fault() {
     std::vector<std::uint32_t> nodes;
     const Topology topology = hierarchy().built_topology(nodes);
@@ -127,7 +127,8 @@ class Edited {
   }
 
  private:
-  /// The pairs of a hierarchy of the first body with a body; the number of box tests last, for two bodies.
+  /// Returns the pairs of a hierarchy of the first body with a body; for two bodies, the number of box tests
+  /// last.
   PairBuffer pairs(WideHierarchy<S>& hierarchy, std::uint32_t other) {
     PairBuffer found;
     std::uint64_t tests = 0;
@@ -166,7 +167,7 @@ void edit_at_random(const BuilderConfig& config, const std::vector<typename Edit
     }
   }
   EXPECT_GT(made, 300u);
-  // The arrays hold as many unused places as there are unlike numbers of children, at most.
+  // At most, the arrays have as many unused places as there are different numbers of children.
   EXPECT_LT(edited.hierarchy().node_count(), 250u * 4);
   edited.hierarchy().undo_edits(edited.primitives_of(0));
   edited.hierarchy().refit(edited.positions());
@@ -205,7 +206,7 @@ INSTANTIATE_TEST_SUITE_P(Shapes, WideEdits,
                                   std::to_string(std::get<2>(test.param));
                          });
 
-// Every kind of fault is seen: an edit that does not list its changes, boxes that are not recomputed.
+// Every kind of fault is detected: an edit that does not list its changes, boxes that are not recomputed.
 TEST(WideEditsOnce, FaultsAreSeen) {
   const BuilderConfig config{.method = BuildMethod::sah, .width = 8, .leaf_size = 4};
   std::size_t unlisted = 0, unfitted = 0, tries = 0;
@@ -236,7 +237,7 @@ TEST(WideEditsOnce, FaultsAreSeen) {
   EXPECT_GT(unfitted, tries / 2);
 }
 
-// Where numbers of children recur, the arrays do not grow for ever.
+// Where numbers of children recur, the arrays stop growing.
 TEST(WideEditsOnce, PlacesAreTakenAgain) {
   using Op = Edited<float>::Op;
   Edited<float> edited(250, {.method = BuildMethod::sah, .width = 8, .leaf_size = 1}, 5);

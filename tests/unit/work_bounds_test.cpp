@@ -1,6 +1,6 @@
-// The work of every strategy on scenes with large numbers: a gap between two sheets, far larger than what
-// rounding does to it, costs no strategy much more than a refit, wherever the scene lies and whatever else a
-// body holds. Loops over the registry.
+// The work of every strategy on scenes with large numbers: where two sheets have a gap far larger than the
+// rounding errors, no strategy costs much more than a refit, wherever the scene lies and whatever else a body
+// contains. Loops over the registry.
 
 #include <gtest/gtest.h>
 
@@ -17,7 +17,7 @@ namespace kbvh::test::work_bounds_test {
 namespace {
 
 constexpr std::uint32_t sheet_side = 33, keyframes = 4, frames_per_keyframe = 4;
-/// A strategy may make so many times the box tests of a refit and its leaves.
+/// A strategy may make this many times the box tests of a refit and its leaves.
 constexpr std::uint64_t allowed = 20;
 
 struct Work {
@@ -82,7 +82,7 @@ std::string description_of(const std::string& id) {
   return {};
 }
 
-/// Whether a strategy's description says when and why it takes more.
+/// Whether a strategy's description states when and why it makes more tests.
 bool admits_it(const std::string& id) {
   return description_of(id).find("20 times the box tests of `bottom_up`") != std::string::npos;
 }
@@ -97,7 +97,7 @@ void expect_bounded_work(const char* scalar) {
                         most = allowed * (refit.box_tests + frames * leaves_of(far));
     for (const StrategyEntry& entry : registry()) {
       if (entry.factory<S>() == nullptr || entry.info.guarantee == Guarantee::approximate) continue;
-      if (entry.info.max_primitive_pairs != 0) continue;  // quadratic, and never run on scenes of some size
+      if (entry.info.max_primitive_pairs != 0) continue;  // quadratic, and never run on larger scenes
       const Work work = work_of(entry, far), without = work_of(entry, near);
       const std::string where = entry.info.id + " on " + name + " in " + scalar +
                                 ", where the same without " + "large numbers takes " +

@@ -1,4 +1,4 @@
-// What the façade shows of event-driven strategies, and its descriptions of strategies.
+// The façade's view of event-driven strategies, and its descriptions of strategies.
 
 #include <gtest/gtest.h>
 
@@ -14,7 +14,7 @@
 namespace kbvh::test::world_events_test {
 namespace {
 
-/// A strip of triangles whose vertices cross each other on every axis, and a strip that stands in its way.
+/// A strip of triangles whose vertices cross each other on every axis, and a strip in its way.
 struct Strips {
   World world{Precision::float64};
   static constexpr std::uint32_t vertices = 24;
@@ -35,7 +35,7 @@ struct Strips {
   }
 };
 
-/// Expects that every box is that of the realisers, where sides without one are the parent's.
+/// Expects that every box is that of the realisers; sides without one are the parent's.
 void expect_boxes_of_realisers(World& world, std::uint32_t body) {
   WorldHierarchy tree;
   std::vector<std::uint32_t> realisers;
@@ -62,7 +62,7 @@ TEST(WorldEvents, RealisersGiveTheBoxesBeforeAndAfterEdits) {
   for (const WorldStrategy& strategy : World::strategy_descriptions()) {
     if (!strategy.events || !strategy.has_float64) continue;
     SCOPED_TRACE(strategy.id);
-    // Queries of the BoxTree read tighter boxes than those that nodes inherit, unless asked not to.
+    // Queries of the BoxTree read tighter boxes than those that nodes inherit, unless configured otherwise.
     const bool inherits = strategy.id == "kinetic_boxtree";
     Strips strips(strategy.id, inherits ? std::map<std::string, std::string>{{"leaf_boxes", "inherited"}}
                                         : std::map<std::string, std::string>{});

@@ -1,5 +1,5 @@
 // Through the façade: audits, verdicts and the truth at a frame are those of the judge; positions that are
-// handed in are read where they lie; strategies are described in the words of result files.
+// handed in are read in place; strategies are described in the words of result files.
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
-// The façade answers what the library answers, says what is wrong with what it is given, and walks from event
-// to event as the theory checks do.
+// The façade gives the library's answers, reports errors in its input, and walks from event to event like the
+// theory checks.
 
 #include "core/facade/world.hpp"
 
@@ -81,7 +81,7 @@ TEST(World, AnswersWhatTheLibraryAnswers) {
     }
 }
 
-// Of volumes of every kind, the hierarchy shows the boxes around them.
+// For volumes of every kind, the hierarchy shows the boxes around them.
 TEST(World, ShowsBoxesAroundVolumes) {
   for (const char* id : {"bottom_up_volumes", "kinetic_kdop"}) {
     const StrategyEntry& entry = find_strategy(id);
@@ -98,8 +98,8 @@ TEST(World, ShowsBoxesAroundVolumes) {
   }
 }
 
-/// Whether the pairs that began and ended add up to the world's pairs, after each of some frames and after a
-/// reset.
+/// Returns whether the pairs that began and ended add up to the world's pairs, after each of some frames and
+/// after a reset.
 void expect_changes_add_up(const std::string& id, const TestScene<float>& test) {
   SCOPED_TRACE(id);
   World world = world_of(test.scene);
@@ -179,7 +179,7 @@ void expect_the_same_hits(const char* id) {
     }
     for (const WorldRayQuery query : {WorldRayQuery::closest, WorldRayQuery::any}) {
       std::vector<RayHit> expected(rays.size());
-      std::vector<WorldHit> found(1000);  // is replaced
+      std::vector<WorldHit> found(1000);  // old content, to be replaced
       session.hits(RayQuery(query), rays, std::span<RayHit>(expected), times);
       world.hits(query, plain, found);
       ASSERT_EQ(found.size(), expected.size());
@@ -257,7 +257,7 @@ TEST(World, ContactsFrameByFrame) {
   float z = 1;
   for (const double t : {1.0, 2.0, 3.0}) {
     z -= 0.75F;
-    world.set_positions(leaf, triangle_at(5));  // the last ones before the world moves count
+    world.set_positions(leaf, triangle_at(5));  // the last positions before the world moves count
     world.set_positions(leaf, triangle_at(-5));
     world.set_positions(leaf, triangle_at(z));
     world.contacts(t, contacts);
@@ -272,7 +272,7 @@ TEST(World, ContactsFrameByFrame) {
   EXPECT_EQ(found[2], 0u);
 }
 
-// Contacts after a change of plans: the leaf turns round before it has come down.
+// Contacts after a change of plans: the leaf turns back before it has come down.
 TEST(World, ContactsAfterChangesOfPlans) {
   for (const StrategyEntry& entry : registry()) {
     if (!entry.info.can.contacts || !entry.info.can.plan_changes || entry.factory<float>() == nullptr)
@@ -374,7 +374,7 @@ TEST(World, SaysWhatIsWrong) {
 }
 
 // The walk from event to event shows what `kbvh theory` proves: the same changes of bounds, in the same
-// order, with the same exact times.
+// order, at the same exact times.
 template <class S>
 void expect_the_same_log(const char* name) {
   const TestScene<S> test = synthetic_scene<S>(name, 3);

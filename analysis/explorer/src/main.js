@@ -162,7 +162,7 @@ function othersButton(count) {
   });
 }
 
-/** Puts a view's legend beside its figures. */
+/** Puts a view's legend next to its figures. */
 function besideLegend(parts) {
   const legend = parts.find((one) => one.classList.contains("legend") || one.classList.contains("legend-box"));
   if (!legend) return parts;
@@ -335,7 +335,7 @@ function scheme(name) {
   host.theme.setAttribute("aria-label", `switch to the ${name === "dark" ? "light" : "dark"} scheme`);
 }
 
-/** Makes the page anew from files of results. */
+/** Makes the page again, from files of results. */
 async function read(files) {
   if (!files.length) return;
   const names = [...files].map((file) => file.name).join(", ");
@@ -416,7 +416,7 @@ function build() {
   scheme(document.documentElement.dataset.scheme ?? (dark.matches ? "dark" : "light"));
 }
 
-/** Listens to what outlives a change of the results. */
+/** Adds the listeners that outlive a change of the results. */
 function listen() {
   host.filters.addEventListener("keydown", (event) => event.key === "Escape" && showFilters(false));
   host.tabs.addEventListener("keydown", (event) => {

@@ -7,7 +7,7 @@ const MACHINE = ["cpu", "kernels", "simd", "compiler", "flags", "build_type", "o
 const OF_GROUP = ["cpu", "os", "compiler", "flags", "build_type", "simd", "kernels"];
 const COUNTERS = ["certificates_failed", "values_written", "nodes_visited", "box_tests", "triangle_tests"];
 const VERIFIED = ["pairs", "candidates", "missed_candidates", "missed", "extra"];
-/** What tells, at the end of a scene's name, that something else than pairs at frames was asked: ANSWER of scene_names.py. */
+/** The ending of a scene's name that says that something other than pairs at frames was asked: ANSWER of scene_names.py. */
 const ANSWER = /( \((contacts|changes of (candidates|pairs)|(in)?coherent rays(, any)?|\w+ kernels)\))*$/;
 
 const number = (value, digits) => {

@@ -56,7 +56,7 @@ py::dict plain(const WorldVerdict& verdict) {
   return out;
 }
 
-/// The façade for Python: keeps the arrays alive whose memory the world reads, and lets other threads run
+/// The façade for Python: keeps alive the arrays whose memory the world reads, and lets other threads run
 /// while it works.
 class PythonWorld {
  public:

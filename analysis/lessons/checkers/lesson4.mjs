@@ -19,7 +19,7 @@ export const breakT9 = {
   wrong: () => [state(scenes.shoal()), state(scenes.tangents(6))],
 };
 
-/// Triangles in a row, the first the tallest. One vertex moves by (dx, dy): the second of the first triangle, if not told.
+/// Triangles in a row, the first the tallest. One vertex moves by (dx, dy): by default the second of the first triangle.
 function row(dx, dy, { triangles: m = 4, vertex = 1 } = {}) {
   const all = Array.from({ length: m }, (_, i) => i), from = all.flatMap((i) => [[3 * i, 0.125 * i], [3 * i + 1, 0.5], [3 * i + 0.25, i === 0 ? 1 : 0.75]]);
   const to = from.map(([x, y], v) => (v === vertex ? [x + dx, y + dy] : [x, y]));

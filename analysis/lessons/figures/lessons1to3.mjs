@@ -23,7 +23,7 @@ export function refitTree({ race4: { request, trace } }) {
   return picture("A tree of seven nodes at the begin and at the end: the same tree, new intervals",
     text(40, 44, "t = 0 s", "big"), drawTree(nodes, { x: 20, y: 90, w: 900, h: 130 }, { label: interval(0), css: () => "a" }),
     text(40, 304, "t = 1 s", "big"), drawTree(nodes, { x: 20, y: 345, w: 900, h: 130 }, { label: interval(1), css: () => "b" }),
-    text(940, 44, `${xs.length} points, ${nodes.length} intervals`, "quiet", "end"), text(940, 304, "every interval is written anew, children first", "quiet", "end"));
+    text(940, 44, `${xs.length} points, ${nodes.length} intervals`, "quiet", "end"), text(940, 304, "every interval is written again, children first", "quiet", "end"));
 }
 
 export function flightPlan() {

@@ -58,7 +58,7 @@ export function valuesOverL(data, numbers) {
 export function breakEven(data, numbers) {
   const at = scale(0, Math.log10(10000), 330, 900), log = (v) => at(Math.log10(Math.max(1, v)));
   const rows = [["an event in 2006's tree", 1000 * numbers["cloth.kinetic2006.event_us"].value, "a"], ["an event in today's tree", 1000 * numbers["cloth.kinetic.event_us"].value, "c"],
-    ["allowed beside the refit of 2006", numbers["cloth.break_even_period_ns"].value, "b"], ["allowed beside today's refit", numbers["cloth.break_even_ns"].value, "b"]];
+    ["allowed against the refit of 2006", numbers["cloth.break_even_period_ns"].value, "b"], ["allowed against today's refit", numbers["cloth.break_even_ns"].value, "b"]];
   return picture("What one event costs, and what it may cost", text(40, 50, "nanoseconds per event, tablecloth of 16,200 triangles, l = 10", "bold"),
     [1, 10, 100, 1000, 10000].map((v) => [line(log(v), 90, log(v), 430, "grid"), text(log(v), 460, v.toLocaleString("en"), "small quiet", "middle")]),
     rows.map(([label, value, css], i) => [text(318, 137 + 84 * i, label, "small " + css, "end"), rect(log(1), 112 + 84 * i, log(value) - log(1), 38, css + " f" + css, 4), text(log(value) + 10, 138 + 84 * i, Math.round(value).toLocaleString("en"), "bold")]));

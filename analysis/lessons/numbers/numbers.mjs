@@ -1,4 +1,4 @@
-// All numbers of the course, each with its source. They are made anew when a program or a scene has changed.
+// All numbers of the course, each with its source. They are made again when a program or a scene has changed.
 import { createHash } from "node:crypto";
 import { existsSync, readdirSync, readFileSync, writeFileSync } from "node:fs";
 import { dirname, join } from "node:path";

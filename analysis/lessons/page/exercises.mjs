@@ -9,7 +9,7 @@ export const all = { ...states, ...exerciseStates() };
 export const mounted = new Map();
 let loading = null;
 
-/// Loads the lab's script and style once. Both are ordinary files beside the lessons, so that pages work from a folder.
+/// Loads the lab's script and style once. Both are ordinary files next to the lessons, so that pages work from a folder.
 function loadLab() {
   loading ??= new Promise((resolve, reject) => {
     const style = document.createElement("link");
@@ -72,7 +72,7 @@ export async function api() {
   return { createEngine, trace: (request) => trace(createEngine, request) };
 }
 
-/// What makes two states the same work: precision, frames, and the bodies without their names.
+/// The parts that two states of the same work have in common: precision, frames, and the bodies without their names.
 export function essence({ scene, precision = "float64" }) {
   return JSON.stringify([precision, scene.frames?.l ?? 1, scene.bodies.map(({ shape = "polygons", vertices, indices, offsets, times, positions }) => {
     const primitives = offsets ? Array.from(offsets) : Array.from({ length: indices.length / 3 + 1 }, (_, i) => 3 * i);

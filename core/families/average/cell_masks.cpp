@@ -33,7 +33,7 @@ auto CellMasks<S>::grid_of(const S* rows, std::uint32_t width, std::uint32_t slo
   return grid;
 }
 
-/// Adds the area of a triangle to the cells of the centroids of cuts^2 equal triangles, into which it is cut.
+/// Adds the area of a triangle, cut into cuts^2 equal triangles, to the cells of their centroids.
 template <class S>
 void CellMasks<S>::add_triangle(const Grid& grid, int cuts, const S* const (&corners)[3], float area) {
   const S step = S(1) / S(3 * cuts);
@@ -42,7 +42,8 @@ void CellMasks<S>::add_triangle(const Grid& grid, int cuts, const S* const (&cor
   for (int i = 0; i < cuts; ++i)
     for (int j = 0; j < cuts - i; ++j)
       for (int up = 0; up < (i + j + 1 < cuts ? 2 : 1); ++up) {
-        // Upright: the corner of least coordinates plus a third; the other one between upright ones.
+        // Upright triangles: the corner of least coordinates plus a third; the other triangles lie between
+        // upright ones.
         const S u = S(3 * i + 1 + up) * step, v = S(3 * j + 1 + up) * step, w = 1 - u - v;
         S x[3];
         for (int axis = 0; axis < 3; ++axis)

@@ -10,8 +10,8 @@ namespace kbvh {
 /// The grids of all nodes of a wide hierarchy, by slot: 8 * wide node + lane of the node's box there.
 ///
 /// A grid is relative to its box, so it stays right while the polygons of a node only move, turn by right
-/// angles and stretch along the axes; all other deformation makes it wrong gradually. `sample` makes all
-/// grids anew.
+/// angles and stretch along the axes; any other deformation gradually invalidates it. `sample` makes all
+/// grids from scratch.
 template <class S>
 class CellMasks {
  public:

@@ -7,7 +7,7 @@
 
 namespace kbvh {
 
-/// The polygons of a node over a grid of 4 x 4 x 4 cells in its box, one bit a cell: whether the cell holds
+/// The polygons of a node over a grid of 4 x 4 x 4 cells in its box, one bit per cell: whether the cell holds
 /// any. Bit x + 4 y + 16 z.
 using CellMask = std::uint64_t;
 inline constexpr int cells_per_axis = 4;
@@ -18,13 +18,13 @@ enum class Distribution : std::uint8_t {
   cells,  ///< those in the overlap of the two boxes
 };
 
-/// A node as the probability sees it.
+/// The data of a node that the probability uses.
 struct FilledBox {
   std::array<double, 3> lower, upper;
   CellMask filled;
-  /// How well these cells are filled, on average: 1 where the polygons of a cell have the area that cuts it
-  /// in two, and in proportion to their area below. (Klein & Zachmann 2003 count only cells that are well
-  /// filled; where polygons are sparse there are none, and all pairs would be equal.)
+  /// How well these cells are filled, on average: 1 where the polygons of a cell have at least the area that
+  /// cuts it in two, and less in proportion to their area. (Klein & Zachmann 2003 count only cells that are
+  /// well filled; where polygons are sparse there are none, and all pairs would be equal.)
   double amount = 1;
 };
 
@@ -42,7 +42,7 @@ inline constexpr double planes_meet = 0.61685027506808487;
 ///         mean widths, which for boxes are the sums of their edges (Cauchy)
 ///
 /// The paper counts cells that are filled by both (hypergeometric: s cells, of which s f_a and s f_b are
-/// filled), and takes an intersection in such a cell for certain. Here the cells are independent, so that
+/// filled), and assumes a certain intersection in each of them. Here the cells are independent, so that
 /// fractions of cells count, too. O(1).
 inline double probability_of_meeting(const FilledBox& a, const FilledBox& b, Distribution distribution) {
   struct Tables {

@@ -32,12 +32,11 @@ class ProbablePairs {
   const Entry& top() const { return heap_.front(); }
   Entry pop();
 
-  /// Adds the pairs of the roots' children of a pair of bodies whose boxes overlap. Returns the number of box
-  /// tests.
+  /// Adds the pairs of children of two roots with overlapping boxes. Returns the number of box tests.
   std::uint64_t start(std::uint32_t bodies, const Side& a, const Side& b, Distribution distribution) {
     return expand({1, bodies, root, root}, a, b, distribution);
   }
-  /// Adds the pairs of children of a pair that was popped and is not of two leaves. Returns the number of box
+  /// Adds the pairs of children of a popped pair, unless it consists of two leaves. Returns the number of box
   /// tests.
   std::uint64_t expand(const Entry& entry, const Side& a, const Side& b, Distribution distribution);
   static bool is_leaf(const Side& side, std::uint32_t slot) {
@@ -46,7 +45,7 @@ class ProbablePairs {
   std::size_t bytes() const { return heap_.capacity() * sizeof(Entry); }
 
  private:
-  /// The slots to go on with from a slot: itself for a leaf, else its children.
+  /// The slots that follow a slot in the traversal: the slot itself for a leaf, else its children.
   struct Group {
     std::uint32_t first, count;
   };

@@ -20,13 +20,13 @@ struct BlendTerms {
   }
 };
 
-/// What is known of one body for the whole clip, from which its boxes at any time are blended.
+/// The data about one body for the whole clip, from which its boxes at any time are blended.
 template <class S>
 class BlendSource {
  public:
   virtual ~BlendSource() = default;
   /// Describes the blend at time t, such that every box contains the positions of its vertices, truth B. The
-  /// body moves as its keyframes say. Allocates only where `out` has less memory than at an earlier time.
+  /// body must follow its keyframes. Allocates only if `out` has less memory than it needs.
   virtual void blend_at(double t, BlendTerms<S>& out) const = 0;
   virtual std::size_t bytes() const = 0;
 };

@@ -41,9 +41,9 @@ class BlendedRows : public RowsOnDemand<S> {
 };
 
 /// The shared part of strategies whose boxes at any time are blends of stored boxes, known from the whole
-/// clip: a derived class gives each moving body its source at every `reset`, which is part of the clip.
+/// clip. A derived class gives each moving body its source at every `reset`, which is part of the clip.
 /// Frames cost O(terms) for each body, and O(terms) for each node that a query reads. Bodies at rest keep
-/// tight boxes; bodies whose vertices get plans of their own are refitted at every frame from then on, since
+/// tight boxes. Bodies whose vertices get their own plans are refitted at every frame from then on, because
 /// their motion is no longer that of the clip.
 template <class S>
 class BlendedStrategy : public CountedStrategy<S>, public AnswersRays<S>, public TakesPlanChanges<S> {
@@ -112,7 +112,7 @@ class BlendedStrategy : public CountedStrategy<S>, public AnswersRays<S>, public
     }
   }
 
-  /// Boxes that no query read are computed for the audit, as a query would.
+  /// Boxes that no query has read are computed for the audit, as a query would do.
   std::optional<AuditView> audit_view(std::uint32_t index) const override {
     const Body& body = bodies_[index];
     const WideHierarchy<S>& hierarchy = body.rows.hierarchy();
@@ -137,18 +137,18 @@ class BlendedStrategy : public CountedStrategy<S>, public AnswersRays<S>, public
  protected:
   enum class Known : std::uint8_t {
     still,    ///< rests unless its plans change: tight boxes, made at the reset
-    blended,  ///< moves as the clip says
+    blended,  ///< follows the clip
     refitted  ///< vertices have their own plans: boxes are refitted at every frame
   };
   struct Body {
     BlendedRows<S> rows;
-    std::unique_ptr<BlendSource<S>> source;  ///< of bodies that move as the clip says
+    std::unique_ptr<BlendSource<S>> source;  ///< for bodies that follow the clip
     BlendTerms<S> terms;
     Blend<S> blend{};  ///< a view of these terms
     Known known = Known::still;
   };
 
-  /// Makes the source of a body that moves as its keyframes say; called by `reset_to`, body by body.
+  /// Makes the source of a body that follows its keyframes; called by `reset_to`, body by body.
   virtual std::unique_ptr<BlendSource<S>> make_source(std::uint32_t body, WideHierarchy<S>& hierarchy,
                                                       const FlightPlans<S>& plans) = 0;
   const WideHierarchy<S>& hierarchy(std::uint32_t index) const { return bodies_[index].rows.hierarchy(); }

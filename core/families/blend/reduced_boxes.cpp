@@ -58,10 +58,10 @@ ReducedBoxes<S>::ReducedBoxes(WideHierarchy<S>& hierarchy, const FlightPlans<S>&
   now_.modes.resize(model_.mode_count);
 }
 
-/// Copies the sides of all nodes to their places among the ranges of one term, moved outwards by a share of
-/// themselves: what roundings can do to the term, whatever its weight. In epsilons of the scalar: half for
-/// the weight and half for the product; half for each sum; half for each sum in the measured remainder, and
-/// for storing it; and the rest for moving the side.
+/// Copies the sides of all nodes to their places among the ranges of one term. Moves them outwards by a share
+/// of themselves that covers the roundings of the term, whatever its weight. In epsilons of the scalar: half
+/// for the weight and half for the product; half for each sum; half for each sum in the measured remainder,
+/// and for storing it; and the rest for moving the side.
 template <class S>
 void ReducedBoxes<S>::put(WideHierarchy<S>& hierarchy, std::size_t term, Sides sides, EmptyLanes empty) {
   const std::size_t width = hierarchy.width(), terms = model_.mode_count + 2;
@@ -91,9 +91,10 @@ void ReducedBoxes<S>::blend_at(double t, BlendTerms<S>& out) const {
     out.terms[1 + m] = {ranges_.data() + (1 + m) * scalars_, S(std::abs(now_.modes[m])),
                         now_.modes[m] < 0 ? 1U : 0U};
   out.terms[terms - 1] = {ranges_.data() + (terms - 1) * scalars_, S(now_.remainder), 0};
-  // The terms are moved outwards by their own roundings. What is left is half a unit for the offset, half a
-  // unit of double for the translation, and what double makes of steps, of other coordinates and of the
-  // measured remainder. The last sum is rounded like the frame's position, monotonically.
+  // The terms are moved outwards by their own roundings. The offset covers the rest: half a unit for the
+  // offset, half a unit of double for the translation, and the errors in double of steps, of other
+  // coordinates and of the measured remainder. The last sum is rounded like the frame's position,
+  // monotonically.
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const double margin =
         0.625 * (double(std::numeric_limits<S>::epsilon()) + 0x1p-52) * now_.translated[axis] +

@@ -148,7 +148,7 @@ ReducedModel<S>::ReducedModel(const FlightPlans<S>& plans, const Settings& setti
     }
   });
 
-  // Coordinates of all keyframes: inner products with the shapes. What they leave has this size per vertex.
+  // Coordinates of all keyframes: inner products with the shapes. The rest gives the remainder per vertex.
   coordinates_.assign(keyframes * row(), 0);
   std::vector<double> fields(block * mode_count);  // [coordinate of a block][mode]
   const auto gather = [&](std::size_t first, std::size_t many) {

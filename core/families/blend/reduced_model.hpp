@@ -15,7 +15,7 @@ namespace kbvh {
 /// model is as exact between keyframes as at them. Units: those of the scene.
 template <class S>
 struct ReducedModel {
-  /// How many modes a model gets: the fewest for which the root mean square of the remainder, over all
+  /// Sets how many modes a model gets: the fewest for which the root mean square of the remainder, over all
   /// vertices and keyframes, is at most `tolerance`; but at most `most_modes`.
   struct Settings {
     std::uint32_t most_modes = 16;
@@ -27,7 +27,8 @@ struct ReducedModel {
     std::vector<double> modes;
     double remainder;  ///< the remainder of vertex v lies between remainder * low[v] and remainder * high[v]
     double translated[3];  ///< bounds the magnitude of the translation
-    /// Bounds those of its step, of all modes' displacements and of the remainder over the segment, together.
+    /// Bounds the magnitudes over the segment of its step, of all modes' displacements and of the remainder,
+    /// together.
     double displaced;
   };
 

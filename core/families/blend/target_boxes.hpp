@@ -40,12 +40,12 @@ class TargetBoxes : public BlendSource<S> {
     const auto share = [&](double from, double to) {
       return S(std::max(precise_quotient(two_diff(to, from), two_diff(times[k + 1], times[k])).hi, 0.0));
     };
-    // Not 0: empty lanes are infinite, and 0 times infinity is no number. The offset covers the difference.
+    // Not 0: empty lanes are infinite, and 0 times infinity is NaN. The offset covers the difference.
     const S least = std::numeric_limits<S>::min();
     out.terms[0].weight = std::max(share(t, times[k + 1]), least);
     out.terms.push_back({last.rows.child_bounds.data(), std::max(share(times[k], t), least), 0});
-    // Roundings, in shares of the terms: half a unit each for the weight, two products and the sum; the
-    // offset is added like the frame's position is rounded, monotonically.
+    // Roundings, in shares of the terms: half a unit each for the weight, two products and the sum. The
+    // offset is added monotonically, with the same rounding as the frame's position.
     out.rounding = S(2.5) * std::numeric_limits<S>::epsilon();
     std::fill_n(out.offset, 6, -4 * least * std::max({S(1), first.largest, last.largest}));
   }

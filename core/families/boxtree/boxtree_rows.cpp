@@ -10,11 +10,11 @@ namespace kbvh {
 namespace {
 
 constexpr std::uint32_t none = ~std::uint32_t(0);
-/// Entries of the table that a wide node's rows are filled from: its own sides, in the order of rows, what an
-/// empty lane holds, and then its planes.
+/// Entries of the table that fills a wide node's rows: its own sides, in the order of rows, the value of an
+/// empty lane, and then its planes.
 constexpr std::uint8_t empty_entry = 6, first_plane_entry = 7;
 
-/// The row in which a side stands: lower x, y, z, upper x, y, z.
+/// The row that contains a side: lower x, y, z, upper x, y, z.
 std::uint32_t row_of(std::uint32_t side) {
   return (side >> 1) + 3 * (side & 1);
 }

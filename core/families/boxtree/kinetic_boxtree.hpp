@@ -140,10 +140,10 @@ class KineticBoxTree : public BoxTreeCertificates<S, Queue, Observer> {
   }
 
   /// Rebuilds the tree below a node from the positions at the motion's time, to which the tree must have been
-  /// advanced. Leaves keep their content. Inner nodes and planes are chosen anew; the certificates of these
-  /// nodes, and of the at most six bounds above whose searches cover them, are recomputed. Nodes below get
-  /// new ids; their number does not change. Observers receive no notices. `box` is the box of `top`. O(leaves
-  /// below), plus searches.
+  /// advanced. Leaves keep their content. Chooses new inner nodes and planes; recomputes the certificates of
+  /// these nodes, and of the at most six bounds above whose searches cover them. Nodes below get new ids;
+  /// their number does not change. Observers receive no notices. `box` is the box of `top`. O(leaves below),
+  /// plus searches.
   void rebuild_below(std::uint32_t top, const Box<S>& box, const SampledMotion<S>& motion,
                      BuildMethod method) {
     if (topology_.nodes[top].is_leaf()) return;
@@ -238,7 +238,7 @@ class KineticBoxTree : public BoxTreeCertificates<S, Queue, Observer> {
     }
   }
 
-  /// Rechecks every marked certificate on the marked paths, from the leaves up. `changed(realiser)` tells
+  /// Rechecks every marked certificate on the marked paths, from the leaves up. `changed(realiser)` returns
   /// whether a realiser has a new plan.
   template <class Changed>
   void repair(double t, Changed&& changed) {

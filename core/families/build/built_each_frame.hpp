@@ -7,7 +7,7 @@
 
 namespace kbvh {
 
-/// The shared part of strategies that build what they search anew at every frame. `Body` is what is built for
+/// The shared part of strategies that build a new search structure at every frame. `Body` is the structure of
 /// one body; it is default-constructible and has bytes(). Derived classes implement `build` and
 /// `find_candidates`. Bodies that cannot move are built at `reset` only.
 template <class S, class Body>
@@ -49,7 +49,7 @@ class BuiltEachFrame : public CountedStrategy<S>,
  protected:
   /// Prepares for the builds of `reset`.
   virtual void start() {}
-  /// Prepares a body whose list of primitives is new. A `build` follows.
+  /// Prepares a body with a new list of primitives. A `build` follows.
   virtual void list_changed(std::uint32_t /*body*/) {}
   /// Builds a body from its positions at the current time.
   virtual void build(std::uint32_t body) = 0;
@@ -65,7 +65,7 @@ class BuiltEachFrame : public CountedStrategy<S>,
       build(body_change.body);
     }
   }
-  /// Counts what a build reads, and the boxes that it writes: one for each primitive, and `more`.
+  /// Counts the vertices that a build reads, and the boxes that it writes: one per primitive, and `more`.
   void count_build(std::uint32_t body, std::uint64_t more = 0) {
     this->count_.add(Counter::values_written, 6 * (more + lists_[body].count));
     this->count_.add(Counter::vertex_reads, this->scene_.primitives(body).vertices.size());

@@ -1,7 +1,7 @@
 #pragma once
 #include <optional>
 
-#include "core/contract/tells_work.hpp"
+#include "core/contract/reports_work.hpp"
 #include "core/families/build/built_each_frame.hpp"
 #include "core/families/build/built_tree.hpp"
 #include "core/families/build/curve_order.hpp"
@@ -17,7 +17,7 @@ namespace kbvh {
 /// and may have searched(): the clusters searched by all builds, which are then counted. Of the given
 /// topologies, only the leaf size counts.
 template <class S, class Builder>
-class BuiltStrategy : public BuiltEachFrame<S, BuiltTree<S>>, public AnswersRays<S>, public TellsWork {
+class BuiltStrategy : public BuiltEachFrame<S, BuiltTree<S>>, public AnswersRays<S>, public ReportsWork {
   using Base = BuiltEachFrame<S, BuiltTree<S>>;
 
  protected:
@@ -99,9 +99,9 @@ class BuiltStrategy : public BuiltEachFrame<S, BuiltTree<S>>, public AnswersRays
     bodies_[body].fit(order_.boxes());
     count_boxes(body);
   }
-  /// Learns what the search of two bodies took: box tests made, and pairs of primitives found.
+  /// Reports the work of searching two bodies: box tests made, and pairs of primitives found.
   virtual void searched(const BodyPair& /*pair*/, std::uint64_t /*tests*/, std::uint64_t /*found*/) {}
-  /// Learns what the rays of a call did with a body.
+  /// Reports the work of a call's rays in a body.
   virtual void followed(std::uint32_t /*body*/, const RayWork& /*work*/) {}
 
  private:
@@ -123,7 +123,7 @@ class BuiltStrategy : public BuiltEachFrame<S, BuiltTree<S>>, public AnswersRays
   std::uint64_t last_box_tests_ = 0, last_ray_tests_ = 0, searched_before_ = 0;
 };
 
-// Compiled once, in built_strategy.cpp, and not with every strategy.
+// Compiled once, in built_strategy.cpp, instead of with every strategy.
 extern template class BuiltEachFrame<float, BuiltTree<float>>;
 extern template class BuiltEachFrame<double, BuiltTree<double>>;
 

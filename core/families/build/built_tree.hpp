@@ -9,8 +9,8 @@
 
 namespace kbvh {
 
-/// An 8-wide tree that is built anew at every frame, in the layout that queries read and without a topology.
-/// Keeps its memory: a build allocates only where it needs more nodes or leaves than ever before.
+/// An 8-wide tree that is built from scratch at every frame, in the layout that queries read and without a
+/// topology. Keeps its memory: a build allocates only if it needs more nodes or leaves than ever before.
 template <class S>
 class BuiltTree : public WideTree<S> {
  public:
@@ -21,12 +21,12 @@ class BuiltTree : public WideTree<S> {
 
   /// Begins a tree over `primitives` primitives, without any node.
   void clear(std::uint32_t primitives);
-  /// Returns room for the primitives in the order of the leaves.
+  /// Returns space for the primitives in the order of the leaves.
   std::uint32_t* entries() { return this->primitives_.data(); }
   /// Adds a leaf with the entries [begin, end).
   void add_leaf(std::uint32_t begin, std::uint32_t end);
   std::uint32_t leaf_count() const { return leaves_; }
-  /// Adds nodes, to be set by `node`, in one row; returns the first. Children come after their parents.
+  /// Adds consecutive nodes, to be set by `node`; returns the first. Children come after their parents.
   std::uint32_t add_nodes(std::uint32_t count);
   WideNode& node(std::uint32_t index) { return this->nodes_[index]; }
   std::uint32_t node_count() const { return std::uint32_t(this->nodes_.size()); }
@@ -45,8 +45,8 @@ class BuiltTree : public WideTree<S> {
 };
 
 /// A binary tree that a builder makes from above, laid out with 8 children per node: a node takes the two
-/// children of its binary node, then replaces the heaviest child that is not a leaf by that child's own two
-/// until it is full (Wald et al. 2008). `Source` has
+/// children of its binary node, then repeatedly replaces the heaviest child that is not a leaf by that
+/// child's own two children until the node is full (Wald et al. 2008). `Source` has
 ///   Part               a subtree: a range of primitives, or a node
 ///   count(part)        primitives below
 ///   weight(part)       of parts that are not leaves

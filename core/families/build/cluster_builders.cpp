@@ -11,10 +11,10 @@ namespace kbvh {
 namespace {
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
-/// A round in which less than one in this many clusters begins a mutual choice merges others, too.
+/// If fewer than one in this many clusters is the first of a mutual choice, the round merges others, too.
 constexpr std::uint32_t least_share = 16;
 
-/// Lets a binary tree of clusters be laid out: leaves write their primitives where the last one ended.
+/// Lets a binary tree of clusters be laid out: each leaf appends its primitives to those of the last one.
 template <class S, class Cluster>
 struct ClusterSource {
   using Part = std::uint32_t;
@@ -99,10 +99,10 @@ void LocalClusterBuilder<S>::merge_all(KernelSet kernels) {
   }
 }
 
-/// Chooses who merges: clusters that chose each other. Where sizes grow along the curve, each chooses a
-/// smaller one, and hardly any two choose each other; then a cluster also merges with its choice if that is
-/// still free. No more than 2 * radius clusters choose the same one, so that every round merges a fixed share
-/// of all.
+/// Chooses which clusters merge: those that chose each other. Where sizes grow along the curve, each cluster
+/// chooses a smaller one, and hardly any two choose each other; then a cluster also merges with its choice if
+/// that is still free. At most 2 * radius clusters choose the same one, so every round merges a fixed share
+/// of all clusters.
 template <class S>
 void LocalClusterBuilder<S>::match() {
   std::uint32_t matched = 0;
@@ -121,7 +121,7 @@ void LocalClusterBuilder<S>::match() {
   }
 }
 
-/// Merges all clusters with their partners, in place; returns how many are left.
+/// Merges all clusters with their partners, in place; returns the number of remaining clusters.
 template <class S>
 std::uint32_t LocalClusterBuilder<S>::merge_round() {
   std::uint32_t left = 0;
@@ -232,7 +232,7 @@ struct BinnedSource {
         if (in_box == 0) continue;
         if (in_box == count) break;
         const float cost = surface(box) * float(in_box) + right_cost[b + 1];
-        // Of equal costs, as on a line, the most even split.
+        // Among equal costs, as on a line, takes the most even split.
         const std::uint32_t larger = std::max(in_box, count - in_box);
         if (cost < least || (cost == least && larger < least_larger))
           least = cost, best_axis = axis, last_bin = b, least_larger = larger;

@@ -11,22 +11,22 @@ namespace kbvh {
 
 /// Parallel locally-ordered clustering (Meister & Bittner 2018): clusters in the order of a curve search
 /// their best partner among their next neighbours on each side; those that choose each other become one
-/// cluster, until one is left. If hardly any choose each other, others merge, too: O(n) after the sort,
-/// whatever the boxes are.
+/// cluster, until one is left. If hardly any choose each other, others merge, too, so that the time after the
+/// sort is O(n) for any boxes.
 template <class S>
 class LocalClusterBuilder {
  public:
-  /// `radius`, the neighbours searched on each side, is 8 or 16; `grain` is the number of primitives in a
-  /// cluster at the start.
+  /// `radius`, the number of neighbours searched on each side, is 8 or 16; `grain` is the number of
+  /// primitives in an initial cluster.
   LocalClusterBuilder(std::uint32_t radius, std::uint32_t grain) : radius_(radius), grain_(grain) {}
   void build(BuiltTree<S>& tree, CurveOrder<S>& order, const PrimitiveList& list);
   std::size_t bytes() const;
-  /// Returns how many searches for a partner all builds have made.
+  /// Returns the number of partner searches in all builds.
   std::uint64_t searched() const { return searched_; }
 
   /// A cluster: an initial one, or the union of two.
   struct Cluster {
-    std::uint32_t first, second;  ///< the two; of initial clusters, the grain and unused
+    std::uint32_t first, second;  ///< its two parts; for an initial cluster, its grain, and unused
     std::uint32_t primitives;
     float surface;
   };

@@ -27,7 +27,7 @@ struct CellSource {
       return part.begin + std::uint32_t(std::uint64_t(count(part)) * (leaves / 2) / leaves);
     const std::uint64_t* const keys = order.keys().data();
     const auto differing = [&] { return std::uint32_t((keys[part.begin] ^ keys[part.end - 1]) >> 32); };
-    // A code shared by more primitives than a leaf holds.
+    // A code that more primitives share than fit into a leaf.
     if (differing() == 0 && !order.refine(part.begin, part.end)) return part.begin + count(part) / 2;
     const std::uint64_t bit = std::uint64_t(1) << (32 + std::bit_width(differing()) - 1);
     return std::uint32_t(std::partition_point(keys + part.begin, keys + part.end,
@@ -49,7 +49,7 @@ template <class S>
 void lay_out_evenly(BuiltTree<S>& tree, std::uint32_t primitives) {
   constexpr std::uint32_t width = BuiltTree<S>::most_children;
   const std::uint32_t leaves = (primitives + tree.leaf_size() - 1) / tree.leaf_size();
-  // The first of `whole` things that the i-th of `parts` gets.
+  // Returns how many of `whole` items go to the parts before the i-th of `parts`.
   const auto share = [](std::uint32_t i, std::uint32_t parts, std::uint32_t whole) {
     return std::uint32_t(std::uint64_t(i) * whole / parts);
   };

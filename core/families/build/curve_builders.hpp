@@ -13,9 +13,9 @@ struct KeyRange {
 };
 
 /// Linear bounding volume hierarchy (Lauterbach et al. 2009): a range of primitives along the Morton curve is
-/// split where the highest bit changes in which its codes differ, so that each part fills a cell of a grid. A
-/// range of one code gets a grid of its own. A range that fits into the leaves of one node is cut evenly:
-/// cells would leave these leaves half empty, which costs building time and gains no query time.
+/// split at the highest bit in which its codes differ, so that each part fills a cell of a grid. A range of
+/// one code gets a grid of its own. A range that fits into the leaves of one node is cut evenly: cells would
+/// leave these leaves half empty, which costs building time and gains no query time.
 template <class S>
 class LinearBuilder {
  public:

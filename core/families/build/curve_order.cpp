@@ -8,7 +8,7 @@ namespace kbvh {
 namespace {
 /// Below this number, comparing keys costs less than counting digits.
 constexpr std::uint32_t few = 256;
-/// Up to this number, 22 bits of a code tell primitives apart well enough.
+/// Up to this number of primitives, 22 bits of a code distinguish them well enough.
 constexpr std::uint32_t coarse_count = 1U << 16;
 }  // namespace
 
@@ -60,7 +60,7 @@ void CurveOrder<S>::sort(const PrimitiveList& list, Curve curve) {
   job.living = list.ids();
   job.count = count_;
   job.keys = keys_.data();
-  // Cells need not be much smaller than leaves: a pass less suffices.
+  // Cells need not be much smaller than leaves, so one pass can be skipped.
   job.dropped_bits = count_ <= coarse_count ? 8 : 0;
   job.histogram = count_ <= few ? nullptr : radix_.counts();
   build_kernels<S>(kernels_).curve_keys(job);

@@ -11,8 +11,8 @@
 
 namespace kbvh {
 
-/// The living primitives of a body, and whether all have the same number of corners: does not change unless
-/// the geometry does.
+/// The living primitives of a body, and whether all have the same number of corners. Changes only with the
+/// geometry.
 struct PrimitiveList {
   explicit PrimitiveList(const Primitives& primitives);
   const std::uint32_t* ids() const { return living.empty() ? nullptr : living.data(); }
@@ -22,8 +22,8 @@ struct PrimitiveList {
   std::size_t bytes() const { return living.capacity() * sizeof(std::uint32_t); }
 };
 
-/// The primitives of one body at one time, as builders read them: boxes, and the order along a space-filling
-/// curve. One object serves all bodies in turn and keeps its memory.
+/// The primitives of one body at one time, in the form that builders read: boxes, and the order along a
+/// space-filling curve. One object serves all bodies in turn and keeps its memory.
 template <class S>
 class CurveOrder {
  public:
@@ -40,11 +40,11 @@ class CurveOrder {
   static std::uint32_t primitive(std::uint64_t key) { return std::uint32_t(key); }
   static std::uint32_t code(std::uint64_t key) { return std::uint32_t(key >> 32); }
 
-  /// Sorts the keys [begin, end), which have one code, along the curve through a grid over their own centres.
-  /// Their codes are comparable with each other only, afterwards. Returns false, and does nothing, if all
-  /// centres are the same. O(n log n).
+  /// Sorts the keys [begin, end), which share one code, along the curve through a grid over their own
+  /// centres. Afterwards their codes are comparable only with each other. Returns false, and does nothing, if
+  /// all centres are equal. O(n log n).
   bool refine(std::uint32_t begin, std::uint32_t end);
-  /// Refines all runs of more than `most` keys of one code, until there are none but of equal centres.
+  /// Refines all runs of more than `most` keys with one code, until the only such runs have equal centres.
   void refine_runs(std::uint32_t most);
 
   std::size_t bytes() const;

@@ -7,8 +7,8 @@
 
 namespace kbvh {
 
-/// Runs of a few primitives along a curve, which a builder treats as one: grain 1 is every primitive by
-/// itself. Boxes are in float, for decisions only.
+/// Runs of a few primitives along a curve, each treated as one by a builder; with a grain of 1, every
+/// primitive is a run. Boxes are in float, for decisions only.
 template <class S>
 class Grains {
  public:

@@ -5,17 +5,17 @@
 
 namespace kbvh {
 
-/// Sorts keys whose upper 32 bits are codes of 30 bits, by the code and then by their order before. Keeps its
-/// memory from call to call.
+/// Sorts keys whose upper 32 bits are codes of 30 bits by the code, stably. Keeps its memory from call to
+/// call.
 class RadixSort {
  public:
   static constexpr std::uint32_t digit_bits = 11, digits = 3, bins = 1U << digit_bits;
 
-  /// Returns room for the counts of all digits, [2][digit][bin], the lowest digit first, all 0: the caller
-  /// adds up the digits of the codes in either half before it calls `sort`.
+  /// Returns space for the counts of all digits, [2][digit][bin], the lowest digit first, all 0. The caller
+  /// counts the digits of the codes in either half before it calls `sort`.
   std::uint32_t* counts();
-  /// Sorts `keys`, whose digits `counts` holds: one stable pass per digit (LSD), none for a digit that is the
-  /// same everywhere. O(keys).
+  /// Sorts `keys`, whose digits are counted in `counts`: one stable pass per digit (LSD), none for a digit
+  /// that all keys share. O(keys).
   void sort(std::span<std::uint64_t> keys);
 
   std::size_t bytes() const {

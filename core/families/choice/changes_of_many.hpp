@@ -6,8 +6,9 @@
 
 namespace kbvh {
 
-/// Changes of the answers of several strategies, of which one answers at a time. A strategy that has become
-/// active since the last answer begins all pairs, and is compared with what the one before has reported.
+/// Changes of the answers of several strategies, one of which answers at a time. A strategy that has become
+/// active since the last answer begins all its pairs; these are compared with the pairs that its predecessor
+/// reported.
 template <class S>
 class ChangesOfMany {
  public:
@@ -22,7 +23,7 @@ class ChangesOfMany {
   void switched() {
     for (Reported& one : reported_) one.current = false;
   }
-  /// Asks the active strategy at t.
+  /// Queries the active strategy at t.
   void find(Strategy<S>& strategy, double t, Answer answer, PairBuffer& begun, PairBuffer& ended) {
     Reported& reported = reported_[std::size_t(answer)];
     if (reported.current) {
@@ -37,7 +38,7 @@ class ChangesOfMany {
     for (const PrimitivePair& pair : ended) reported.pairs.erase(pair);
     for (const PrimitivePair& pair : begun) reported.pairs.insert(pair);
   }
-  /// Returns what all changes of an answer add up to.
+  /// Returns the sum of all changes of an answer.
   const PairSet& pairs(Answer answer) const { return reported_[std::size_t(answer)].pairs; }
 
   std::size_t bytes() const {
@@ -48,7 +49,7 @@ class ChangesOfMany {
  private:
   struct Reported {
     PairSet pairs;
-    bool current = false;  ///< by the strategy that is active now
+    bool current = false;  ///< from the currently active strategy
   };
   Reported reported_[2];  // [Answer]
   PairBuffer now_, none_, before_;

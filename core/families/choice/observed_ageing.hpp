@@ -6,35 +6,35 @@
 
 namespace kbvh {
 
-/// What a choice knows of the age of refitted trees. While these answer, the surfaces of their boxes tell how
-/// many of the box tests new trees may save; the first search in rebuilt trees tells how many they do save.
-/// What was learned so is slowly forgotten at later choices, so that a tree is tried again whose bodies may
+/// A choice's knowledge about the age of refitted trees. While these answer, the surfaces of their boxes
+/// indicate how many of the box tests new trees may save; the first search in rebuilt trees shows how many
+/// they do save. Later choices slowly forget this result, so that a tree is tried again if its bodies may
 /// have returned to their first shape.
 class ObservedAgeing {
  public:
-  /// `surface`: of the refitted trees, see TellsWork.
+  /// `surface`: of the refitted trees, see ReportsWork.
   void start_over(double surface) {
     *this = {};
     new_surface_ = surface;
   }
-  /// Registers the frame's search of the refitted trees, by slabs or boxes alone as in `seen`.
+  /// Registers this frame's search of the refitted trees, by slabs or by boxes alone, as `seen` states.
   void refitted(double tests, double candidates, int frame, const Observed& seen) {
     tests_ = estimate_ = tests;
     found_ = candidates == seen.candidates ? seen.boxed * candidates : candidates;
     frame_ = frame;
   }
-  /// Registers the frame's search of rebuilt trees; `frame` counts from the start.
+  /// Registers this frame's search of rebuilt trees; `frame` counts from the start.
   void rebuilt(double tests, double candidates, int frame, Observed& seen) {
-    if (!known_ && tests > 0 && frame_ != frame - 1) {  // too long ago to be compared with
+    if (!known_ && tests > 0 && frame_ != frame - 1) {  // too long ago for a comparison
       known_ = compared_ = true;
       factor_ = 1 / (1 - std::min(seen.aged, 0.99));
     } else if (!known_ && tests > 0) {
       known_ = true;
-      // Both searches per candidate; some stand for the traversal of bodies without contact.
+      // Compares both searches per candidate; `quiet` stands for the traversal of bodies without contact.
       factor_ = std::max(1.0, tests_ / tests * (candidates + quiet) / (found_ + quiet));
       if (factor_ > 1.5) kept_ = std::sqrt(kept_);
       compared_ = true;
-      felt_ = possible() > 0 ? (factor_ - 1) * tests / possible() : 1;
+      realised_share_ = possible() > 0 ? (factor_ - 1) * tests / possible() : 1;
       seen.ageing = seen.sorted_ageing = (factor_ - 1) * tests / frame;
       if (seen.candidates > 0) seen.boxed = std::max(1.0, candidates / seen.candidates);
     }
@@ -48,12 +48,12 @@ class ObservedAgeing {
   void look_at_refitted(double surface, int frame, Observed& seen) {
     known_ = false;
     growth_ = new_surface_ > 0 ? std::max(1.0, surface / new_surface_) : 1;
-    const double surplus = felt_ * possible();
+    const double surplus = realised_share_ * possible();
     seen.aged = tests_ > 0 ? std::min(0.99, surplus / tests_) : 0;
     seen.ageing = seen.sorted_ageing = surplus / std::max(1, frame);
   }
-  /// The same while the rebuilt ones do. `growth`: of their surplus, see TellsWork. `sorted`: they are those
-  /// of drift_rebuild, which last longer and whose surplus grows the faster for it.
+  /// Does the same while the rebuilt trees answer. `growth`: of their surplus, see ReportsWork. `sorted`: the
+  /// trees are those of drift_rebuild, which last longer, so that their surplus grows faster.
   void look_at_rebuilt(double growth, bool sorted, Observed& seen) {
     factor_ = 1 + kept_ * (factor_ - 1);
     if (!sorted) {
@@ -72,7 +72,7 @@ class ObservedAgeing {
   double tests() const { return tests_; }
 
  private:
-  /// Returns the tests that new trees save if searches feel the whole growth of the boxes.
+  /// Returns the tests that new trees save if the growth of the boxes affects searches in full.
   double possible() const { return tests_ * (1 - 1 / growth_); }
 
   static constexpr double quiet = 1000;
@@ -80,16 +80,16 @@ class ObservedAgeing {
   double new_surface_ = 0;
   double growth_ = 1;    // of the surfaces, at the last choice
   double tests_ = 0;     // of the last search of the refitted trees
-  double found_ = 0;     // candidates of boxes alone then
-  int frame_ = 0;        // in which they answered it
-  double kept_ = 0.8;    // of the factor at a further choice; closer to 1 with each trial that new trees won
-  double estimate_ = 0;  // of the tests of the refitted trees in this frame
-  double felt_ = 1;      // share of the possible saving that rebuilt trees have saved
-  double factor_ = 1;    // tests of refitted over those of rebuilt trees
-  double longer_ = 2.5;  // growth of drift_rebuild's surplus over that of lbvh_drift
-  double built_growth_ = 0;  // of lbvh_drift's, not yet compared with the other
+  double found_ = 0;     // candidates of boxes alone in that search
+  int frame_ = 0;        // of that search
+  double kept_ = 0.8;    // kept of factor_ - 1 at each choice; approaches 1 with trials that new trees win
+  double estimate_ = 0;  // estimated tests of the refitted trees in this frame
+  double realised_share_ = 1;  // share of the possible saving that rebuilt trees achieved
+  double factor_ = 1;          // tests of refitted over those of rebuilt trees
+  double longer_ = 2.5;        // growth of drift_rebuild's surplus over that of lbvh_drift
+  double built_growth_ = 0;    // of lbvh_drift's surplus, not yet compared with drift_rebuild's
   bool compared_ = false;
-  bool known_ = false;  // the factor was measured since the refitted trees answered last
+  bool known_ = false;  // the factor was measured after the last answer of the refitted trees
 };
 
 }  // namespace kbvh

@@ -11,12 +11,12 @@
 
 namespace kbvh {
 
-/// What a choice knows of the motion of a scene: the steps of some vertices, in sides of leaves.
+/// A choice's knowledge about the motion of a scene: the steps of some vertices, in sides of leaves.
 template <class S>
 class ObservedMotion {
  public:
-  static constexpr std::uint32_t samples = 24;       ///< vertices of a body, or pairs, that are looked at
-  static constexpr std::uint32_t all_samples = 256;  ///< of all moving bodies, but for some of each
+  static constexpr std::uint32_t samples = 24;       ///< sampled vertices of a body, or pairs
+  static constexpr std::uint32_t all_samples = 256;  ///< over all moving bodies, but at least some of each
 
   /// Measures the hierarchies: the median side of leaf boxes, and the number of vertices in leaves.
   ObservedMotion(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies)
@@ -39,7 +39,7 @@ class ObservedMotion {
     for (std::uint32_t body = 0; body < scene_.body_count(); ++body) sample(body, plans_change);
     const double spread = seen.spread;
     seen.step = seen.spread = 0;
-    // Some of many pairs of bodies: similar bodies show similar largest steps.
+    // Takes some of many pairs of bodies: similar bodies have similar largest steps.
     const auto pairs = scene_.pairs();
     seen.many_bodies = pairs.size() > many_pairs;
     const std::size_t apart = (pairs.size() + most_pairs - 1) / most_pairs;
@@ -56,7 +56,7 @@ class ObservedMotion {
   }
 
  private:
-  static constexpr std::size_t many_pairs = 1024, most_pairs = 128;  ///< of bodies; that are looked at
+  static constexpr std::size_t many_pairs = 1024, most_pairs = 128;  ///< pairs of bodies; the number sampled
   struct Velocities {
     std::uint32_t count = 0;  ///< none: the body rests
     double of[samples][3] = {}, mean[3] = {};
@@ -97,7 +97,7 @@ class ObservedMotion {
     if (count == 0 || (!scene_.moving(body) && !plans_change)) return;
     seen.count = std::min(of_body_, count);
     for (std::uint32_t i = 0; i < seen.count; ++i) {
-      // Spreads the samples by the golden ratio: even steps may hit the same place in every row of a grid.
+      // Spreads the samples by the golden ratio: even steps could hit the same place in every row of a grid.
       const std::uint32_t share = 0x9e3779b9u * i;  // of 2^32
       const auto vertex = std::uint32_t(std::uint64_t(share) * count >> 32);
       for (int axis = 0; axis < 3; ++axis) {
@@ -127,8 +127,8 @@ class ObservedMotion {
     }
     return sum / double(touching.size());
   }
-  /// Measures how a body's vertices move relative to another body as a whole. Common motion does not count:
-  /// bounds that move contain it.
+  /// Measures how a body's vertices move relative to another body as a whole. Common motion does not count,
+  /// because moving bounds contain it.
   void pass(std::uint32_t body, std::uint32_t other, double step, Observed& seen) const {
     const Velocities &own = velocities_[body], &others = velocities_[other];
     if (own.count == 0 || leaf_size_[body] <= 0) return;
@@ -149,7 +149,7 @@ class ObservedMotion {
   std::vector<double> leaf_size_;  ///< [body]
   double reads_ = 0, primitives_ = 0;
   std::uint32_t moving_ = 0;            ///< number of moving bodies
-  std::uint32_t of_body_ = samples;     ///< vertices of a body that are looked at
+  std::uint32_t of_body_ = samples;     ///< number of sampled vertices of a body
   std::vector<Velocities> velocities_;  ///< [body], per second
 };
 

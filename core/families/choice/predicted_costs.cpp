@@ -13,8 +13,8 @@ using Cost = costs::Choice;
 
 namespace {
 
-/// Returns what new trees and those that are no longer new cost in a frame, built at the period at which both
-/// together cost the least, for a surplus of box tests that grows linearly. `build`: the cost of one.
+/// Returns the cost per frame of building and ageing trees, for the period between builds that minimises it.
+/// The surplus of box tests is assumed to grow linearly with age. `build`: the cost of one build.
 double upkeep(double build, double ageing) {
   return std::min(build, std::sqrt(2 * build * Cost::surplus_test * ageing));
 }
@@ -22,7 +22,7 @@ double upkeep(double build, double ageing) {
 double without_slabs(const Observed& seen) {
   return seen.plain_known ? plain_cost(seen) : refit_cost(seen);
 }
-/// Returns the cost of its update, and of its search in new trees.
+/// Returns the cost of a refit's update.
 double refit_update(const Observed& seen) {
   return costs::Work::plain.read * seen.reads + costs::Work::body * seen.bodies;
 }
@@ -82,8 +82,8 @@ double join_cost(const Observed& seen) {
   const double l = seen.frames_per_segment, moves = seen.slide * l;
   if (seen.rays_only || seen.changes_per_frame > 0.02 || !(l < 1e6))
     return std::numeric_limits<double>::infinity();
-  // Bodies apart: one box at each end, unless they come to meet; over a long distance they may pass through
-  // each other.
+  // Bodies apart: one box at each end, unless the bodies come to meet; over a long distance they may pass
+  // through each other.
   if (!seen.near) return seen.apart_factor * Cost::join_apart / l * (1 + moves * moves) * refit_cost(seen);
   const double alike = 1 - seen.spread;
   // Small bodies that move past each other meet further bodies on their way, in addition to their current

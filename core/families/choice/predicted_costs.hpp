@@ -4,20 +4,20 @@
 
 namespace kbvh {
 
-/// What a choice among strategies knows of a scene and of the work so far. Counts and plans, never times.
+/// A choice's knowledge about a scene and the work so far. Counts and plans, never times.
 struct Observed {
   double frames_per_segment = 1;  ///< of the current segment; infinite if it has no end
   double changes_per_frame = 0;   ///< frames with changes of plans, as a share of the last frames
   double candidates = 0;          ///< in a frame, of leaf_slabs
-  /// Candidates of boxes alone over these; measured where another strategy was active.
+  /// Candidates of boxes alone over these; measured while another strategy was active.
   double boxed = 1.3;
-  /// Box tests in a frame of leaf_slabs, which counts comparisons of slabs as such, and of bottom_up.
+  /// Box tests in a frame of leaf_slabs, which counts comparisons of slabs as box tests, and of bottom_up.
   double slab_tests = 0, plain_tests = 0;  // estimated while others answer
-  /// `boxed` where leaf_slabs and bottom_up searched two frames in a row; 1 before bottom_up is tried, which
-  /// is the best that can be hoped for; infinite where it is not to be tried.
+  /// `boxed` where leaf_slabs and bottom_up searched two frames in a row; 1, the best possible value, before
+  /// bottom_up is tried; infinite where it is not to be tried.
   double plain_boxed = std::numeric_limits<double>::infinity();
-  bool plain_known = false;  ///< what bottom_up takes is known, and not hoped
-  bool near = false;         ///< bodies are not known to be apart
+  bool plain_known = false;  ///< the cost of bottom_up is measured, not hoped
+  bool near = false;         ///< bodies may be near each other
   double reads = 0;          ///< vertices that a refit reads
   double primitives = 0;     ///< of moving bodies
   double bodies = 0;         ///< that move
@@ -27,14 +27,13 @@ struct Observed {
   double spread = 1;         ///< how different the steps are among a body's vertices; 0: all the same
   double join_factor = 1;    ///< cost of the join by its work, over its prediction (ObservedJoin)
   double apart_factor = 1;   ///< the same where bodies are apart, if more
-  bool rays_only = false;    ///< no pairs are asked
+  bool rays_only = false;    ///< only rays are asked for, no pairs
   double aged = 0;           ///< share of box tests in refitted trees that new ones would save
-  /// Growth of a frame's tests beyond those of new trees from frame to frame, in lbvh_drift and
-  /// drift_rebuild.
+  /// Growth per frame of the tests beyond those of new trees, in lbvh_drift and drift_rebuild.
   double ageing = 0, sorted_ageing = 0;
 };
 
-/// Says in words what was last seen.
+/// Describes in words what was last observed.
 std::string last_seen(const Observed& seen);
 
 // The predicted costs of a frame, in nanoseconds of one machine; only their order matters.
@@ -45,15 +44,15 @@ double refit_cost(const Observed& seen);
 double plain_cost(const Observed& seen);
 /// lbvh_drift: refits trees of its own, and builds new ones when the surplus of tests has grown.
 double rebuilt_cost(const Observed& seen);
-/// drift_rebuild: the same with the trees of a refit, whose builds cost more, and which are better.
+/// drift_rebuild: the same with the trees of a refit, whose builds cost more and give better trees.
 double sorted_cost(const Observed& seen);
-/// drift_boxes, infinite where only rays are asked: these do not tell of the age of its trees. One search
-/// serves the frames in which a leaf moves by a part of its size. Where bodies deform, more pairs come near
-/// in these frames than a query takes to find.
+/// drift_boxes; infinite where only rays are asked for, because these do not show how old its trees are. One
+/// search serves the frames in which a leaf moves by a part of its size. Where bodies deform, more pairs come
+/// near in these frames than a query takes to find.
 double drift_cost(const Observed& seen);
 /// interval_join: one join serves a segment. Its cost grows with the distance that primitives move past each
 /// other within the segment. A translating body passes by others; the touching part of a deforming body stays
-/// in place. Infinite where plans change, segments have no end, or only rays are asked.
+/// in place. Infinite where plans change, segments have no end, or only rays are asked for.
 double join_cost(const Observed& seen);
 
 }  // namespace kbvh

@@ -11,14 +11,14 @@
 
 namespace kbvh {
 
-/// One body whose boxes were made at an earlier frame, "then", and the known motion since: per axis an
-/// interval that contains the displacement of every vertex, but for a share of the vertex's own coordinate
-/// then (`rounding`). All roundings err to the safe side, for positions up to `admissible_magnitude`. Sides
-/// are lower x, y, z, upper x, y, z.
+/// One body whose boxes were made at an earlier frame, "then", and the known motion since. Per axis, an
+/// interval contains the displacement of every vertex, up to a share of the vertex's own coordinate then
+/// (`rounding`). All roundings err to the safe side, for positions up to `admissible_magnitude`. Sides are
+/// lower x, y, z, upper x, y, z.
 ///
-/// For displacements that are read the share is 0. A bound on steps is one on the plans: positions then and
-/// now are off these by half a unit each, of the coordinate then and of the displacement. Each change of a
-/// plan starts from a stored position, which is off by half a unit more.
+/// If displacements are read, this share is 0. A bound on steps is a bound on the plans: positions then and
+/// now differ from these by half a unit each, of the coordinate then and of the displacement. Each change of
+/// a plan starts from a stored position, which adds another half a unit.
 template <class S>
 struct DriftBody {
   /// The part of a body that a frame reads.
@@ -36,7 +36,7 @@ struct DriftBody {
   S margin[6] = {};                            ///< margin by which its boxes exceed the vertices then
   double moved = 0;      ///< by the bound on steps: displacement of any vertex since then
   bool bounded = false;  ///< displacements are bounded by steps, not read
-  std::uint32_t changes = 0, most_changes = 0;  ///< of plans since then, and those that boxes are made for
+  std::uint32_t changes = 0, most_changes = 0;  ///< of plans since then, and the number that boxes allow for
   double leaf_size = 0;                         ///< median side of a leaf's box
   Watch watch = Watch::nothing;
   bool near = false;     ///< to another body: it takes part in searches
@@ -57,7 +57,7 @@ struct DriftBody {
     moved = 0;
     changes = 0;
   }
-  /// Returns the share of a coordinate then by which a vertex may have moved beyond the interval, after
+  /// Returns the share of its coordinate then by which a vertex may have moved beyond the interval, after
   /// `most_changes` changes of plans.
   S rounding() const { return bounded ? S((1 + most_changes / 2.0) * eps) : S(0); }
 
@@ -85,8 +85,8 @@ struct DriftBody {
     }
     put_box();
   }
-  /// Registers a change of plans: the displacement so far stays bounded; from the stored position on,
-  /// rounding errors start anew.
+  /// Registers a change of plans: the displacement so far stays bounded; rounding errors start again from the
+  /// stored position.
   void plans_changed() {
     // Inflate: the stored position's rounding error grows with the distance moved.
     moved = above(moved + eps * moved);
@@ -119,7 +119,7 @@ struct DriftBody {
       margin[axis + 3] = S(least + frames * std::max(0.0, rate_high[axis]));
     }
   }
-  /// Returns a box that contains the body as long as it keeps to its margins.
+  /// Returns a box that contains the body while it stays within its margins.
   Box<double> swept() const {
     Box<double> all = box;
     for (int axis = 0; axis < 3; ++axis) {
@@ -130,7 +130,7 @@ struct DriftBody {
   }
 
  private:
-  /// Returns how far vertices may have moved beyond a side and the interval.
+  /// Returns how far vertices may have moved beyond the interval, at a side.
   double off(double side) const {
     if (!bounded) return 0;
     return (2.0 + std::max(changes, most_changes)) * eps * std::abs(side) +

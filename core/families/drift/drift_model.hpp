@@ -37,8 +37,9 @@ class DriftModel {
     plain_candidates_ = candidates;
   }
 
-  /// Returns the number of frames for the next search; 0 if refitting and querying at every frame is better,
-  /// for `rest` frames. `step` is the mean closing of a side per frame, relative to the sides of two leaves.
+  /// Returns the number of frames for the next search; 0 if, for `rest` frames, it is better to refit and
+  /// query at every frame. `step` is the mean closing of a side per frame, relative to the sides of two
+  /// leaves.
   int period(double step) {
     // An empty list does not predict the size of later lists.
     if (!known_ || counts_.listed == 0)

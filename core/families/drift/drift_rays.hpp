@@ -9,14 +9,14 @@
 
 namespace kbvh {
 
-/// What the stored boxes of a body are at the current frame.
+/// The state of a body's stored boxes at the current frame.
 enum class StoredBoxes : std::uint8_t {
   current,  ///< they contain the body
   old,      ///< they contain the body after DriftBody::moved_on
   unknown,  ///< only DriftBody::box does
 };
 
-/// Tells what the stored boxes of a body are. `listed`: boxes are kept as long as the lists that were made
+/// Returns the state of a body's stored boxes. `listed`: boxes are kept as long as the lists that were made
 /// with them.
 template <class S>
 StoredBoxes stored_boxes(const DriftBody<S>& body, bool listed) {
@@ -24,8 +24,8 @@ StoredBoxes stored_boxes(const DriftBody<S>& body, bool listed) {
   return listed && body.watch == DriftBody<S>::Watch::drift ? StoredBoxes::old : StoredBoxes::current;
 }
 
-/// Answers rays in boxes that were made at an earlier frame, inflated by the displacements since then where
-/// rays first read them.
+/// Answers rays in boxes that were made at an earlier frame. When rays first read a box, it is inflated by
+/// the displacements since then.
 template <class S>
 class DriftRays {
  public:
@@ -35,9 +35,9 @@ class DriftRays {
   /// Registers that bodies may have moved, or boxes were made.
   void moved() { ++moment_; }
 
-  /// Sets hits[i] to the answer to rays[i] at the time of the motion. `stored_boxes` says what the boxes of
-  /// hierarchies[body] are; unknown ones are computed from positions where a ray enters the body. The other
-  /// parameters are those of WideRays.
+  /// Sets hits[i] to the answer to rays[i] at the time of the motion. `stored_boxes` returns the state of the
+  /// boxes of hierarchies[body]; unknown ones are computed from positions when a ray enters the body. The
+  /// other parameters are those of WideRays.
   void find(std::vector<WideHierarchy<S>>& hierarchies, const std::vector<DriftBody<S>>& bodies, bool listed,
             RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits, TriangleTestStats& stats,
             std::uint64_t& tests, RayBodies* counts) {
@@ -84,7 +84,7 @@ class DriftRays {
   }
 
  private:
-  /// The boxes of one body at the last call at which its stored ones did not serve.
+  /// The boxes of one body at the last call for which its stored boxes were not current.
   struct Moving {
     StoredBoxes boxes = StoredBoxes::current;
     std::uint64_t moment = 0;

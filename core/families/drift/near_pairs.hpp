@@ -51,7 +51,7 @@ struct NearSide {
   const S* positions;  ///< [vertex][3], one scalar past the end readable
   const S* margin;
   NearLeafRows<S>* rows;  ///< rows of these positions, as far as they exist
-  S rounding = 0;         ///< the share of its coordinate by which a vertex may be off beyond the closing
+  S rounding = 0;         ///< additional error of a vertex, relative to its coordinate
 };
 
 /// The pairs of primitives of two bodies whose boxes can meet while the bodies close in on each other by no
@@ -64,9 +64,9 @@ struct NearSide {
 template <class S>
 class NearPairs {
  public:
-  /// Searches anew. The reach per side is the sum of both margins and must be positive. Adds the box tests
-  /// made to `tests`. Allocates only if there are more pairs than ever before. Both hierarchies need one
-  /// width and leaf size and must not be empty.
+  /// Searches from scratch. The reach per side is the sum of both margins and must be positive. Adds the box
+  /// tests made to `tests`. Allocates only if there are more pairs than ever before. Both hierarchies need
+  /// the same width and leaf size and must not be empty.
   void build(const NearSide<S>& a, const NearSide<S>& b, std::uint32_t body_a, std::uint32_t body_b,
              const S (&reach)[6], NearWork<S>& work, std::uint64_t& tests);
   void clear();

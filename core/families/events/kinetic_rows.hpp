@@ -90,7 +90,7 @@ class KineticRowsQuery {
     check_layouts(
         scene.pairs(), [&](std::uint32_t body) -> const auto& { return rows_[body].hierarchy(); });
   }
-  /// Lays out the rows of one body anew, after a change of its tree. O(nodes).
+  /// Lays out the rows of one body again, after a change of its tree. O(nodes).
   template <class Forest>
   void follow(const Forest& forest, const SceneView<S>& scene, std::uint32_t body) {
     rows_[body].follow(forest.tree(body), scene.primitives(body));
@@ -104,7 +104,7 @@ class KineticRowsQuery {
     for (std::uint32_t body = 0; body < rows_.size(); ++body) rows_[body].rows().new_frame(motion, body);
   }
 
-  /// Appends the candidates of the current frame. Adds the number of box tests to `tests`, and that of
+  /// Appends the candidates of the current frame. Adds the number of box tests to `tests`, and the number of
   /// positions read without being fetched to `reads`.
   template <class Forest>
   QueryStatus find(const Forest& forest, NearBodies& near_bodies, const SceneView<S>& scene,

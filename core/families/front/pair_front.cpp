@@ -107,7 +107,8 @@ QueryStatus PairFront<S>::run(std::uint32_t body_pair, const Side& a, const Side
   descended_ += update.descended;
   climbed_ += update.climbed;
   const std::size_t untested = update.depth + (update.end - update.next);
-  // An untested entry may be apart while its parent has noted so, and would be made twice later on.
+  // The boxes of an untested entry may be apart after its parent has recorded that; it would be made twice
+  // later on.
   if (untested != 0) return {untested};
   kept_parts_.push_back({body_pair, kept_count_, update.kept_count});
   kept_count_ = update.kept_count;

@@ -9,15 +9,15 @@
 namespace kbvh {
 
 /// The fronts of all pairs of bodies in the tree of tests of their hierarchies (bounding volume test tree),
-/// kept from frame to frame. An entry is a pair of nodes whose boxes overlap, with a bit for each pair of
-/// their children that overlaps: one sweep over all children compares the disjoint pairs below the entry and
-/// the overlapping ones, from which new entries descend. An entry whose own boxes are apart is dropped, and
-/// its parent finds the same bit cleared: the front climbs. Where no bit changes, an update reads the entries
-/// one after another, and nothing in it depends on a branch that is hard to predict.
+/// kept from frame to frame. An entry is a pair of nodes with overlapping boxes, and has a bit for each pair
+/// of their children that overlaps. One sweep over all children compares the disjoint pairs below the entry
+/// and the overlapping ones, from which new entries descend. An entry whose own boxes are apart is dropped,
+/// and its parent finds the same bit cleared: the front climbs. If no bit changes, an update reads the
+/// entries one after another, and no branch in it is hard to predict.
 ///
-/// A frame is `start_frame`, then `run` for pairs of bodies in ascending order; pairs left out
-/// lose their entries. The result equals that of WideQuery::run at any time and in any order of times, as
-/// long as the topologies stay.
+/// A frame is `start_frame`, then `run` for pairs of bodies in ascending order; skipped pairs lose their
+/// entries. As long as the topologies stay, the result equals that of WideQuery::run at any time and in any
+/// order of times.
 template <class S>
 class PairFront {
  public:
@@ -28,15 +28,15 @@ class PairFront {
   void start_frame();
   /// Appends the pairs of primitives whose boxes, and those of all nodes above them, overlap. `body_pair` is
   /// greater than at the last call of the frame. `query` turns pairs of leaves into pairs of primitives. The
-  /// stored boxes of both sides must be current. Returns the entries that the budget left untested; in that
-  /// case this pair of bodies starts anew next time. Adds the box tests made to `tests`. Allocates where the
-  /// front is larger than ever before.
+  /// stored boxes of both sides must be current. Returns the number of entries that the budget left untested;
+  /// if there are any, this pair of bodies starts from scratch next time. Adds the box tests made to `tests`.
+  /// Allocates if the front is larger than ever before.
   QueryStatus run(std::uint32_t body_pair, const Side& a, const Side& b, WideQuery<S>& query, PairBuffer& out,
                   std::uint64_t& tests, const Budget& budget = {});
 
   /// Returns the entries, of all pairs of bodies, after the last query.
   std::span<FrontPair> entries() { return {kept_.data(), kept_count_}; }
-  /// Return the numbers of entries made and dropped so far; those that `clear` dropped are not counted.
+  /// Return the numbers of entries made and dropped so far, without those that `clear` dropped.
   std::uint64_t descended() const { return descended_; }
   std::uint64_t climbed() const { return climbed_; }
   std::size_t bytes() const;
@@ -48,7 +48,7 @@ class PairFront {
     std::size_t begin, end;
     std::size_t entries() const { return end - begin; }
   };
-  /// Returns the entries of the last frame, and passes over those of pairs of bodies that are not queried.
+  /// Returns the entries of the last frame, and skips those of pairs of bodies that are not queried.
   Part old_part(std::uint32_t body_pair);
   FrontUpdate make_update(const Part& part, std::uint64_t test_limit);
   /// Makes room for the next step, in both arrays of entries, because they are exchanged.

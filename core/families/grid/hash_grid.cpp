@@ -9,7 +9,7 @@
 namespace kbvh {
 
 namespace {
-/// So few boxes are one cell, compared at once.
+/// Up to this number, all boxes are in one cell and compared at once.
 constexpr std::uint32_t few = 16;
 /// At most this many cells for each box; the next power of two.
 constexpr std::uint32_t cells_per_box = 2;
@@ -62,7 +62,7 @@ template <class S>
 void HashGrid<S>::plan_sizes(double mean_size) {
   S longest = 0;
   for (int axis = 0; axis < 3; ++axis) longest = std::max(longest, region_.upper[axis] - region_.lower[axis]);
-  if (!std::isfinite(longest)) {  // no number of cells can be told: all boxes are in one
+  if (!std::isfinite(longest)) {  // the number of cells is undefined: all boxes are in one
     std::copy_n(region_.lower, 3, region_.upper);
     longest = 0;
   }
@@ -82,7 +82,7 @@ std::uint32_t HashGrid<S>::plan_cells() {
     level.first_cell = cells;
     level.end = end += level.count;
     if (level.count == 0) continue;
-    // What is rounded off a box's side must not let it begin before the cells that are looked up.
+    // A rounded side must not make a box begin before the cells that are looked up.
     for (int axis = 0; axis < 3; ++axis)
       level.reach[axis] = std::nextafter(level.reach[axis], std::numeric_limits<S>::infinity());
     int bits = 0;
@@ -120,8 +120,8 @@ void HashGrid<S>::fill(const Selection& entered) {
   job.region = region_;
   job.counts = begins_.data() + 1;
   kernels.cells(job);
-  // From counts to begins, one place to the right; the scatter below turns them into ends of the cells, which
-  // are the begins of the next ones.
+  // Turns counts into begins, one place to the right; the scatter below turns these into the ends of the
+  // cells, which are the begins of the next ones.
   std::uint32_t sum = 0;
   for (std::uint32_t cell = 1; cell <= cells; ++cell) {
     const std::uint32_t in_cell = begins_[cell];
@@ -160,7 +160,8 @@ bool HashGrid<S>::enter(const GridBody<S>& a, const PrimitiveList& list_a, const
   const Selection &first = selections_[0], &second = selections_[within_ ? 0 : 1];
   if (first.count == 0 || second.count == 0) return false;
   plan_sizes((first.size_sum + second.size_sum) / (double(first.count) + double(second.count)));
-  // Entering costs less than looking up; but a few boxes are entered in no time.
+  // Entering costs less than looking up, so the larger set is entered, unless the smaller one is so small
+  // that entering it costs nothing.
   a_is_entered_ =
       std::min(first.count, second.count) <= few ? first.count <= second.count : first.count >= second.count;
   const Selection &entered = a_is_entered_ ? first : second, &own = a_is_entered_ ? second : first;

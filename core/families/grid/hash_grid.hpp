@@ -17,7 +17,7 @@ class GridBody {
   std::uint32_t count() const { return boxes_.count(); }
   /// Returns the boxes, [primitive][8]: lower x, y, z, unused, upper x, y, z, unused.
   const S* boxes() const { return boxes_.boxes(); }
-  /// Returns the box of all, laid out likewise.
+  /// Returns the box of all, in the same layout.
   const S* bound() const { return bound_; }
   Box<double> box() const;
   std::size_t bytes() const { return boxes_.bytes(); }
@@ -29,13 +29,13 @@ class GridBody {
 
 /// Finds the pairs of overlapping boxes of two bodies, or of one body, by a uniform grid in space that lasts
 /// for one search. Only boxes that meet both bodies' boxes take part. Each box of one body is entered once,
-/// into the cell of its lower corner: no pair is found twice, and the boxes of cells that follow each other
-/// along x are one run of an array. A box looks up all cells in which a box that it meets can begin.
+/// into the cell of its lower corner, so that no pair is found twice and the boxes of consecutive cells along
+/// x are one run of an array. A box looks up all cells in which a box that it meets can begin.
 ///
 /// Boxes much larger than most have grids with larger cells of their own (up to 8 levels), as in a
 /// hierarchical grid. Cells are numbered modulo powers of two (the hash), so that memory is proportional to
-/// the boxes whatever the size of space. Time is proportional to boxes and tests. Exact: boxes are closed and
-/// compared as they are.
+/// the number of boxes, for any size of space. Time is proportional to boxes and tests. Exact: boxes are
+/// closed and compared as they are.
 template <class S>
 class HashGrid {
  public:
@@ -74,7 +74,7 @@ class HashGrid {
   /// Returns the number of cells of all levels.
   std::uint32_t plan_cells();
   void fill(const Selection& entered);
-  /// Returns whether there may be more pairs than the buffer holds now.
+  /// Returns whether there may be more pairs than the buffer currently holds.
   bool look_up(std::uint64_t& tests);
 
   double cell_;

@@ -7,12 +7,12 @@
 
 namespace kbvh {
 
-/// Limits the length of segments while plans change at run time. A long segment is begun less often, but its
-/// boxes get looser with its length and with every change in it (continuous intersection joins, Zhang et al.
-/// 2008, limit the time of a join in the same way, by the time between two updates of an object). The limit
-/// follows the rate of changes: a segment should end when a quarter of all leaves were made anew in it, and
-/// the limit changes by a factor of two at most from one segment to the next. Without changes in a segment
-/// the limit doubles, until segments are as long as the flight plans foresee.
+/// Limits the length of segments while plans change at run time. Longer segments begin less often, but their
+/// boxes get looser with their length and with every change in them (continuous intersection joins, Zhang et
+/// al. 2008, limit the time of a join in the same way, by the time between two updates of an object). The
+/// limit follows the rate of changes: a segment should end when a quarter of all leaves have been recomputed
+/// in it, and the limit changes by a factor of two at most from one segment to the next. After a segment
+/// without changes the limit doubles, until segments are as long as the flight plans foresee.
 class ChangeHorizon {
  public:
   /// Takes the length in frames; 0: chosen.
@@ -22,17 +22,17 @@ class ChangeHorizon {
     frames_ = 0;
     changes_ = 0;
   }
-  /// Notes that plans changed.
+  /// Records that plans changed.
   void changed() {
     ++changes_;
     if (frames_ == 0) frames_ = fixed_ > 0 ? fixed_ : first;
   }
-  /// Notes that plans changed, and the segment could not be kept: it was too long.
+  /// Records that plans changed, and the segment could not be kept: it was too long.
   void restarted() {
     if (frames_ > 0 && fixed_ == 0) frames_ = std::max(std::floor(frames_ / 2), shortest / 2);
     changed();
   }
-  /// Notes that a segment ends in which this share of all leaves was made anew, each time counted.
+  /// Records that a segment ends in which this share of all leaves was recomputed; every time counts.
   void next_segment(double share_of_leaves) {
     if (frames_ > 0 && changes_ == 0)
       frames_ = frames_ < most ? 2 * frames_ : 0;
@@ -44,7 +44,7 @@ class ChangeHorizon {
   /// Returns the length of segments in frames; 0: not limited.
   double frames() const { return frames_; }
   /// Cuts the interval around t to the limit, with frames of `step` seconds. `before` is the end of the
-  /// preceding segment: the interval begins there, if it contains that time, else at t.
+  /// preceding segment: the interval begins there if it contains that time, else at t.
   void cut(SegmentInterval& interval, double t, double step, double before) const {
     if (frames_ == 0 || !(step > 0)) return;
     interval.begin = interval.begin <= before && before <= t ? before : std::max(interval.begin, t);

@@ -9,7 +9,7 @@
 
 namespace kbvh {
 
-/// The parts of one body's hierarchy that changes of plans reach: primitives with a changed vertex, their
+/// The parts of one body's hierarchy that changes of plans affect: primitives with a changed vertex, their
 /// leaves, and all nodes above. Not for hierarchies that were edited or refilled.
 class ChangedParts {
  public:
@@ -18,7 +18,7 @@ class ChangedParts {
   void prepare(WideHierarchy<S>& hierarchy, std::uint32_t vertices);
   bool is_prepared() const { return !entries_begin_.empty(); }
 
-  /// Marks everything that a vertex reaches. O(its primitives, and the nodes that were not marked).
+  /// Marks everything that a vertex affects. O(its primitives, and the nodes that were not marked).
   void mark(std::uint32_t vertex);
   /// Removes all marks. O(marks).
   void clear();

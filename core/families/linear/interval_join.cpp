@@ -49,7 +49,7 @@ void IntervalJoin<S>::begin_bodies() {
   leaf_pairs_.resize(std::max(leaf_pairs_.size(), 2 * leaf_pairs_room_));
   traversal_ = {stack_.data(),    0, stack_.size(),     leaf_pairs_.data(), 0,
                 leaf_pairs_room_, 1, Budget{}.box_tests};
-  // A root that is a leaf lies in a node's only lane, so the roots are compared there.
+  // A root that is a leaf lies in a node's only lane; the roots are compared there.
   traversal_.stack[traversal_.depth++] = {0, 0};
   leaf_join_ = {width,
                 a.hierarchy().arrays(),
@@ -74,9 +74,9 @@ void IntervalJoin<S>::begin_bodies() {
 /// Describes the slabs of two bodies, without pairs of leaves.
 template <class S>
 SlabSpanPairs<S> IntervalJoin<S>::slabs_of(const BodySegmentBounds<S>& a, const BodySegmentBounds<S>& b) {
-  // For each leaf, over its largest coordinate: the distance of the lines from positions at the ends, half a
-  // unit for positions at frames, 3.1 for products of directions, whose components add up to 1, and corners;
-  // one more for the sum of bounds and slack, and the rest for its own rounding.
+  // For each leaf, relative to its largest coordinate: the distance of the lines from positions at the ends,
+  // half a unit for positions at frames, 3.1 for products of directions, whose components add up to 1, and
+  // corners; one more for the sum of bounds and slack, and the rest for the rounding of this value.
   return {a.hierarchy().arrays(),
           b.hierarchy().arrays(),
           a.slab_leaves(),
@@ -118,7 +118,7 @@ bool IntervalJoin<S>::step(std::uint64_t box_tests) {
   return true;
 }
 
-/// Leaves out pairs of leaves that slabs separate; returns the number of the others.
+/// Leaves out pairs of leaves that slabs separate; returns the number of remaining pairs.
 template <class S>
 std::size_t IntervalJoin<S>::filter_leaves(std::size_t count) {
   slabs_.count = count;
@@ -228,7 +228,7 @@ void IntervalJoin<S>::start_reading() {
     place_.resize(count_);
   }
   for (std::size_t i = 0; i < throughout_; ++i) alive_[i] = primitives_of(i);
-  next_ = alive_count_ = fixed_ = std::uint32_t(throughout_);
+  next_ = alive_count_ = permanent_count_ = std::uint32_t(throughout_);
   waiting_.clear();
   std::fill(std::begin(ending_), std::end(ending_), none);
   present_ = 0;
@@ -259,7 +259,7 @@ template <class S>
 void IntervalJoin<S>::move_to(float fraction) {
   if (!reading_) start_reading();
   const std::uint32_t bucket = FractionBuckets::of(fraction);
-  // Beginning pairs: all of earlier buckets, some of the current one.
+  // Pairs that begin: all of earlier buckets, some of the current one.
   std::size_t kept = 0;
   const auto begin_or_wait = [&](std::uint32_t index) {
     const JoinedPair& pair = sorted_[index];
@@ -274,7 +274,7 @@ void IntervalJoin<S>::move_to(float fraction) {
   for (; next_ < bucket_end_[bucket]; ++next_) begin_or_wait(next_);
   waiting_.resize(kept);
   if (has_beginning_) begin_added(fraction, bucket);
-  // Ending pairs: the lists of earlier buckets as a whole.
+  // Pairs that end: the whole lists of earlier buckets.
   for (; present_ < bucket; ++present_) {
     for (std::uint32_t index = ending_[present_]; index != none; index = next_ending_[index])
       if (!is_removed(index)) end_pair(index);

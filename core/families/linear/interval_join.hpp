@@ -26,13 +26,13 @@ struct FractionBuckets {
 
 /// The pairs of primitives of two bodies whose linear boxes overlap within a segment, with the fractions at
 /// which the overlap begins and ends: one traversal per segment, from which frames are read. Several pairs of
-/// bodies may be joined together, with one traversal each: they share all buffers, and a frame reads them as
-/// one. Prior art: core/adr/0010-prior-art-of-answering-intervals.md.
+/// bodies may be joined together, with one traversal each: they share all buffers, and a frame reads them
+/// together. Prior art: core/adr/0010-prior-art-of-answering-intervals.md.
 template <class S>
 class IntervalJoin {
  public:
-  /// Joins anew for a segment. For one body with itself, pairs that share a vertex are left out unless
-  /// `keep_neighbours` was called. Allocates only if there are more pairs than ever before.
+  /// Joins from scratch for a segment. For one body with itself, pairs that share a vertex are left out
+  /// unless `keep_neighbours` was called. Allocates only if there are more pairs than ever before.
   void join(const LinearSegment<S>& segment, const SceneView<S>& scene, std::uint32_t body_a,
             std::uint32_t body_b) {
     const BodyPair bodies{body_a, body_b};
@@ -42,10 +42,10 @@ class IntervalJoin {
     start(segment, scene, bodies, leaf_pairs_at_once);
     step(std::numeric_limits<std::uint64_t>::max());
   }
-  /// Joins anew on several threads: the same pairs in the same order.
+  /// Does the same on several threads: the same pairs in the same order.
   void join(const LinearSegment<S>& segment, const SceneView<S>& scene, std::span<const BodyPair> bodies,
             Workers& workers);
-  /// Starts the same join in parts: `step` works until it has made the given number of box tests, or slightly
+  /// Starts the same join in parts. `step` works until it has made the given number of box tests, or slightly
   /// more, and returns whether the join is complete. The segment's boxes and positions must stay valid until
   /// then. Pairs of leaves are processed in groups of `leaf_pairs`.
   void start(const LinearSegment<S>& segment, const SceneView<S>& scene, std::span<const BodyPair> bodies,
@@ -63,7 +63,7 @@ class IntervalJoin {
   /// From now on leaves out pairs of triangles that the slab of a leaf separates throughout the segment
   /// (SlabSpanPairs); all bodies must consist of triangles only.
   void use_slabs() { with_slabs_ = true; }
-  /// Returns the pairs of leaves whose boxes overlap within the segment.
+  /// Returns the number of pairs of leaves whose boxes overlap within the segment.
   std::uint64_t leaf_pairs() const { return leaf_pairs_seen_; }
 
   /// Appends the pairs whose boxes overlap at a fraction of the segment. Fractions must not decrease within a
@@ -72,25 +72,24 @@ class IntervalJoin {
     move_to(fraction);
     out.insert(out.end(), alive_.begin(), alive_.begin() + std::ptrdiff_t(alive_count_));
   }
-  /// Does the same without the copy: O(pairs that begin or end). Afterwards the functions below tell which
-  /// pairs overlap.
+  /// Does the same without the copy: O(pairs that begin or end). Afterwards the functions below return the
+  /// pairs that overlap.
   void move_to(float fraction);
   bool overlaps(std::uint32_t pair) const {
-    if (pair < fixed_) return true;
+    if (pair < permanent_count_) return true;
     const std::uint32_t place = place_[pair];
-    return place >= fixed_ && place < alive_count_ && alive_places_[place] == pair;
+    return place >= permanent_count_ && place < alive_count_ && alive_places_[place] == pair;
   }
   /// Touches these marks whenever a pair begins or ends to overlap, until the next join.
   void follow(const FollowingMarks& marks) { following_ = marks; }
 
   /// The reader of the pairs: `read` and `move_to`, or a TriangleSpanFilter.
   enum class Reader : std::uint8_t { join, filter };
-  /// Removes the pairs of primitives whose plans changed, and joins these primitives again: they, and all
-  /// pairs within the segment that they take part in from `fraction` on, which must not be before that of the
-  /// last call of `read` or `move_to`. Removed pairs keep their places in `pairs`, but end at -1; new pairs
-  /// are appended. `changed` holds the changes by body. Returns the box tests made. O(pairs) at the first
-  /// call in a segment; afterwards in proportion to the changed primitives, their pairs, and the nodes above
-  /// them.
+  /// Removes the pairs of primitives whose plans changed, and joins these primitives again: all their pairs
+  /// within the segment from `fraction` on, which must not be before that of the last call of `read` or
+  /// `move_to`. Removed pairs keep their places in `pairs`, but end at -1; new pairs are appended. `changed`
+  /// holds the changes by body. Returns the box tests made. O(pairs) at the first call in a segment;
+  /// afterwards in proportion to the changed primitives, their pairs, and the nodes above them.
   std::uint64_t repair(std::span<const ChangedParts> changed, float fraction, Reader reader);
   /// Returns the pairs that the last `repair` removed, and the first one that it appended.
   std::span<const std::uint32_t> removed() const { return removed_; }
@@ -103,8 +102,8 @@ class IntervalJoin {
   /// overlap throughout are first in it.
   std::size_t from_begin() const { return bucket_end_[0]; }
   std::size_t throughout() const { return throughout_; }
-  /// Calls use(pair) for all pairs in the order in which the traversal found them, those that overlap
-  /// throughout first: it is similar in consecutive segments.
+  /// Calls use(pair) for all pairs in the order in which the traversal found them, which is similar in
+  /// consecutive segments; pairs that overlap throughout come first.
   template <class Use>
   void for_found(const Use& use) const {
     const std::size_t joined = throughout_ + found_at_.size();
@@ -187,7 +186,7 @@ class IntervalJoin {
   /// Alive pairs, in lists by the bucket of their end.
   std::uint32_t ending_[FractionBuckets::count] = {}, present_ = 0;
   std::vector<std::uint32_t> next_ending_;
-  std::uint32_t fixed_ = 0;  ///< so many pairs are the first of `alive_`, in their order
+  std::uint32_t permanent_count_ = 0;  ///< these first pairs of `alive_` overlap throughout, in order
   FollowingMarks following_;
   /// Only with several threads: the join; [part of the pairs][bucket] the place of the next pair; the pairs
   /// of bodies that were joined.

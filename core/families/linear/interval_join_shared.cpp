@@ -8,7 +8,7 @@
 namespace kbvh {
 
 namespace {
-/// The pairs that one thread sorts at once.
+/// Number of pairs that one thread sorts at once.
 constexpr std::size_t pairs_at_once = 8192;
 }  // namespace
 
@@ -40,10 +40,10 @@ void IntervalJoin<S>::join(const LinearSegment<S>& segment, const SceneView<S>& 
                 self && !with_neighbours_ ? &scene.primitives(bodies_[i].first) : nullptr);
     if (with_slabs_) shared_.use_slabs(slabs_of(a, b));
     added_.push_back(i);
-    ++tests;  // of the roots, as a traversal counts
+    ++tests;  // of the roots, which a traversal counts, too
   }
   shared_.run(workers, found_throughout_, found_partly_, ends, tests);
-  // One entry for every pair of bodies, also for those that were not joined.
+  // One entry for every pair of bodies, even for those that were not joined.
   const std::size_t joined = ends.size();
   const Found all = joined == 0 ? Found{0, 0} : ends.back();
   ends.resize(bodies_.size());
@@ -58,8 +58,8 @@ void IntervalJoin<S>::join(const LinearSegment<S>& segment, const SceneView<S>& 
   sort_by_begin(workers);
 }
 
-/// A counting sort as that of one thread: each part of the pairs counts its buckets, and knows then where its
-/// pairs go.
+/// A counting sort like that of one thread: each part of the pairs counts its buckets, and then knows where
+/// its pairs go.
 template <class S>
 void IntervalJoin<S>::sort_by_begin(Workers& workers) {
   constexpr std::uint32_t buckets = FractionBuckets::count;

@@ -10,7 +10,7 @@ namespace kbvh {
 
 /// Answers as changes, from the joins of one segment after another. Within a segment the cost is that of the
 /// pairs that begin or end, and of the pairs whose triangles have to be tested at the frame. The first answer
-/// in a segment is compared with the last one in an earlier segment: O(pairs), as the join itself.
+/// in a segment is compared with the last one in an earlier segment: O(pairs), like the join itself.
 template <class S>
 class JoinChanges {
  public:
@@ -39,7 +39,7 @@ class JoinChanges {
         append(parts[i], one.before, [&](std::uint32_t pair) { return one.marks[i].is_reported(pair); });
     }
   }
-  /// Notes that the joins were repaired: a pair may end and begin again, in another place.
+  /// Records that the joins were repaired: a pair may end, and begin again in another place.
   void repaired() {
     for (One& one : of_) one.repaired = true;
   }

@@ -133,14 +133,15 @@ std::uint64_t IntervalJoin<S>::repair(std::span<const ChangedParts> changed, flo
   if (std::none_of(bodies_.begin(), bodies_.end(), is_changed)) return 0;
   if (reader == Reader::join) {
     if (!reading_) start_reading();
-    for (; fixed_ > 0; --fixed_) place_[fixed_ - 1] = alive_places_[fixed_ - 1] = fixed_ - 1;
+    for (; permanent_count_ > 0; --permanent_count_)
+      place_[permanent_count_ - 1] = alive_places_[permanent_count_ - 1] = permanent_count_ - 1;
   }
   if (!indexed_) index_pairs();
   remove_changed(changed, reader);
   const std::uint64_t before = tests();
   leaf_join_.throughout.found = leaf_join_.partly.found = 0;
   found_.clear();
-  const bool slabs = std::exchange(with_slabs_, false);  // those of changed leaves hold no longer
+  const bool slabs = std::exchange(with_slabs_, false);  // slabs of changed leaves are no longer valid
   while (found_.size() < bodies_.size()) {
     traversal_ = {};
     const BodyPair& pair = bodies_[found_.size()];
@@ -164,7 +165,7 @@ std::uint64_t IntervalJoin<S>::repair(std::span<const ChangedParts> changed, flo
   return tests() - before;
 }
 
-// The header announces instances of the whole class, so that every member is instantiated where it is
+// The header declares the instances of the whole class, so every member must be instantiated where it is
 // defined.
 template void IntervalJoin<float>::index_pairs();
 template void IntervalJoin<float>::link(std::uint32_t);

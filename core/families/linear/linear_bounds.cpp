@@ -42,7 +42,7 @@ LinearBounds<S>::LinearBounds(const SceneView<S>& scene, const SegmentMotion<S>&
 
 template <class S>
 void LinearBounds<S>::choose_segment(Segment& segment, const SegmentMotion<S>& motion, double t) const {
-  // Plans without an end: as many frames ahead as segments have lasted lately.
+  // Plans without an end: foresees as many frames as recent segments have lasted.
   const double endless_duration = 1.01 * foreseen_ * (step_ > 0 ? step_ : 1.0 / 64);
   SegmentInterval interval = segment_interval(motion, body_count(), t, segment.pieces, endless_duration);
   if (!whole_ && segment.pieces == 1) horizon_.cut(interval, t, step_, segments_[present_].end);
@@ -52,7 +52,7 @@ void LinearBounds<S>::choose_segment(Segment& segment, const SegmentMotion<S>& m
   segment.endless = interval.endless;
 }
 
-/// Starts to make the boxes of one end, which has its slot; returns the remaining work.
+/// Starts to make the boxes of one end, whose slot is assigned; returns the remaining work.
 template <class S>
 auto LinearBounds<S>::begin_end(Segment& segment, const SegmentMotion<S>& motion, std::uint32_t index,
                                 std::uint32_t end, double t) -> Refit {
@@ -73,7 +73,7 @@ auto LinearBounds<S>::begin_end(Segment& segment, const SegmentMotion<S>& motion
   if (body.hierarchy.empty()) return {};
   at.excess = 0;
   // Over an uncut segment a body's boxes may be translated, as long as they are not much larger than tight
-  // ones.
+  // boxes.
   const bool whole =
       end == 1 && segment.begin == motion.lines_begin(index) && segment.end == motion.lines_end(index);
   const auto step = whole ? motion.translation(index) : std::optional<Translation<S>>{};
@@ -282,7 +282,7 @@ bool LinearBounds<S>::start_ahead(const SegmentMotion<S>& motion) {
   forget_ahead();
   const Segment& before = segments_[present_];
   Segment& segment = segments_[1 - present_];
-  // The cuts of such a segment are decided only when it begins; a change of plans would undo the work.
+  // Such a segment's cuts are decided only when it begins, and a change of plans would discard the work.
   if (whole_ || cuts_.max_looseness > 0 || horizon_.frames() > 0 || motion.time() != before.end) return false;
   bool ends = false;
   for (std::uint32_t body = 0; body < body_count(); ++body)
@@ -309,7 +309,7 @@ bool LinearBounds<S>::step_ahead(std::uint64_t nodes) {
       const std::uint32_t body = ahead_.body++;
       if (begin_side(segment, before, *ahead_.motion, body, before.end, Before::stays))
         ahead_.refit = begin_end(segment, *ahead_.motion, body, 1, segment.end);
-      // Work done at once counts as a part of a refit.
+      // Work done immediately counts as a part of a refit.
       if (ahead_.refit.left == 0) done += hierarchy(body).node_count() / 4;
     } else if (ahead_.finished) {
       return true;
@@ -383,9 +383,9 @@ double LinearBounds<S>::looseness_in_the_middle() {
   return tight > 0 ? linear / tight - 1 : 0;
 }
 
-/// Finds the bodies whose box meets another body's box over the segment. Bodies that
-/// come near again get all their boxes. Bodies that are apart get only one box from the next segment on, and
-/// keep their boxes until then.
+/// Finds the bodies whose box meets another body's box over the segment. Bodies that come near again get all
+/// their boxes. Bodies that are apart get only one box from the next segment on, and keep their boxes until
+/// then.
 template <class S>
 void LinearBounds<S>::finish(Segment& segment, const SegmentMotion<S>& motion) {
   std::fill(near_.begin(), near_.end(), 0);

@@ -20,8 +20,8 @@ namespace kbvh {
 /// no updates, and the boxes at its end are those at the start of the next one. Prior art:
 /// core/adr/0010-prior-art-of-answering-intervals.md.
 ///
-/// Segments are those of all bodies overlaid: from the latest knot of any plan to the next one, cut as
-/// configured by `SegmentCuts`. Every side of a box is inflated by what rounding can do to it between the
+/// Segments overlay those of all bodies: each lasts from the latest knot of any plan to the next one, cut as
+/// configured by `SegmentCuts`. Every side of a box is inflated by the largest rounding error between the
 /// flight plans and the positions of frames (WideEnds): about two ulps of its own coordinate.
 ///
 /// The boxes of a body that translates over a segment are translated instead of refitted, as long as no side
@@ -29,8 +29,8 @@ namespace kbvh {
 template <class S>
 class LinearBounds {
  public:
-  /// Needs topologies of one width and leaf size for all bodies of a pair; throws std::invalid_argument
-  /// otherwise.
+  /// Throws std::invalid_argument unless the topologies of the bodies of each pair have the same width and
+  /// leaf size.
   LinearBounds(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies,
                KernelSet kernels, const LinearSettings& settings);
 
@@ -43,11 +43,11 @@ class LinearBounds {
   void enter();
   /// Registers that plans changed at the motion's current time: the rest of the segment is a new one.
   void plans_changed();
-  /// Follows changes of plans at the motion's current time within the segment: only leaves with a changed
-  /// vertex, and the boxes above them, are made anew, from lines that are extended back to the segment's
+  /// Follows changes of plans at the motion's current time within the segment. Only leaves with a changed
+  /// vertex, and the boxes above them, are recomputed, from lines that are extended back to the segment's
   /// begin. Boxes hold from the current time on. Returns false if the segment cannot be kept: call
-  /// `plans_changed` then. Later knots of these plans are followed by `advance`, as far as they lie in the
-  /// segment. O(changes x (primitives of a vertex + height)); the first call for a body is linear in it.
+  /// `plans_changed` then. Later calls of `advance` follow the later knots of these plans in the segment.
+  /// O(changes x (primitives of a vertex + height)); the first call for a body is linear in its size.
   bool repair(std::span<const PlanChange<S>> changes);
   /// Returns the parts of each body that changed since the segment began or `clear_changed` was called.
   std::span<const ChangedParts> changed() const { return changed_; }
@@ -57,18 +57,18 @@ class LinearBounds {
   }
   void clear_changed();
   /// Counts work since `start`: plan changes after which the segment was kept, or not; leaves and wide nodes
-  /// made anew in these segments.
+  /// that were recomputed in these segments.
   struct Repairs {
     std::uint64_t kept = 0, restarted = 0, leaves = 0, nodes = 0;
   };
   const Repairs& repairs() const { return repairs_; }
 
   /// Starts building the next segment; `motion` is the view from the current segment's end. Returns false if
-  /// this is not possible: no segment follows, segments are cut by looseness, plans changed lately, or
+  /// this is not possible: no segment follows, segments are cut by looseness, plans changed recently, or
   /// `enter` was called after the last `start`. The work is discarded if plans change, if `advance` does not
   /// reach the segment, or if the segment leaves the range of numbers.
   bool start_ahead(const SegmentMotion<S>& motion);
-  /// Continues building until at least `nodes` nodes were done by this call. Returns whether all bounds are
+  /// Continues building until this call has processed at least `nodes` nodes. Returns whether all bounds are
   /// complete.
   bool step_ahead(std::uint64_t nodes);
   bool has_ahead() const { return ahead_exists_; }
@@ -96,7 +96,7 @@ class LinearBounds {
   /// Returns the same, with missing boxes marked as stale.
   AuditView audit_view(std::uint32_t body, double t) const;
 
-  /// Counts the work on a body at ends of segments, and the segments for which it was skipped: at rest, apart
+  /// Counts the work on a body at ends of segments, and the segments in which it was skipped: at rest, apart
   /// with only one box, or translated.
   struct Counts {
     std::uint64_t refitted = 0;  ///< wide nodes
@@ -111,7 +111,7 @@ class LinearBounds {
   struct Segment : LinearSegment<S> {
     double knot = 0;  ///< end of the whole segment, of which this may be a piece
     std::uint32_t pieces = 1;
-    bool endless = false;  ///< of lines without an end; length estimated: not to be cut
+    bool endless = false;  ///< lines have no end: the length is estimated, and must not be cut
   };
   /// Boxes under construction, from the last node to the first.
   struct Refit {
@@ -148,7 +148,7 @@ class LinearBounds {
   double looseness_in_the_middle();
   Refit begin_end(Segment& segment, const SegmentMotion<S>& motion, std::uint32_t body, std::uint32_t end,
                   double t);
-  /// Makes all boxes in new memory of a body's empty.
+  /// Makes all boxes of a body, in new memory, empty.
   void make_empty(std::uint32_t body, S* child_bounds, S* node_bounds) {
     shared_refit_.start();
     shared_refit_.add(hierarchy(body), nullptr, child_bounds, node_bounds);
@@ -177,7 +177,8 @@ class LinearBounds {
   ChangeHorizon horizon_;
   std::vector<ChangedParts> changed_;    ///< [body]
   std::vector<std::uint8_t> to_remake_;  ///< [body]
-  /// A changed vertex leaves the range of numbers within the segment, or its end is not known well enough.
+  /// A changed vertex leaves the range of numbers within the segment, or the segment's end is not known well
+  /// enough.
   bool lost_ = false;
   std::vector<Knot> knots_;  ///< a heap
   Repairs repairs_;
@@ -211,7 +212,7 @@ class LinearCounts {
       const auto& hierarchy = bounds.hierarchy(body);
       const auto &now = bounds.counts(body), &before = before_[body];
       const std::uint64_t nodes = hierarchy.topology().size();
-      // Parts of refits, such that they add up to whole refits.
+      // Counts parts of refits such that they add up to whole refits.
       const auto refitted = [&](std::uint64_t all) {
         return hierarchy.empty() ? 0
                                  : all * now.refitted / hierarchy.node_count() -

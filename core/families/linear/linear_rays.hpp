@@ -9,18 +9,18 @@
 
 namespace kbvh {
 
-/// Answers rays at a time of a segment whose boxes are linear in time: the boxes that rays read are
-/// interpolated where they are first read. A body that is apart from all others has only one box in the
-/// segment: its boxes are computed from its positions when a ray enters it.
+/// Answers rays at a time of a segment whose boxes are linear in time. A box is interpolated when a ray first
+/// reads it. A body that is apart from all others has only one box in the segment: its boxes are computed
+/// from its positions when a ray enters it.
 template <class S>
 class LinearRays {
  public:
   LinearRays(const SceneView<S>& scene, const SampledMotion<S>& motion)
       : rays_(scene, motion), motion_(motion) {}
 
-  /// Sets hits[i] to the answer to rays[i] at t, the time of the motion. stale[body][wide node] is not 0
-  /// unless the boxes of the node's children in the body's hierarchy are those at t. The other parameters are
-  /// those of WideRays.
+  /// Sets hits[i] to the answer to rays[i] at t, the time of the motion. stale[body][wide node] must be
+  /// nonzero unless the boxes of the node's children in the body's hierarchy are those at t. The other
+  /// parameters are those of WideRays.
   void find(LinearBounds<S>& bounds, double t, std::vector<std::vector<std::uint8_t>>& stale, RayQuery query,
             std::span<const Ray<S>> rays, std::span<RayHit> hits, TriangleTestStats& stats,
             std::uint64_t& tests, RayBodies* bodies) {
@@ -49,7 +49,7 @@ class LinearRays {
   std::size_t bytes() const { return rays_.bytes() + moments_.capacity() * sizeof(WideMoment<S>); }
 
  private:
-  /// Interpolates the box of a body. The margin exceeds all roundings but the last.
+  /// Interpolates the box of a body. The margin covers all roundings but the last.
   static Box<S> root_at(const BodySegmentBounds<S>& side, S fraction) {
     constexpr S infinity = std::numeric_limits<S>::infinity();
     const Box<double> between = side.widened_between(0, double(fraction));

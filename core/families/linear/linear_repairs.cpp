@@ -18,9 +18,9 @@ namespace {
 /// Orders a heap of knots, the earliest first.
 constexpr auto later = [](const auto& a, const auto& b) { return a.time > b.time; };
 
-/// Computes the coordinate at a time later than the piece's begin, on its line beyond its end, if necessary:
-/// off by half a unit of rounding. Returns false if it is beyond the end a small difference of large numbers,
-/// of which twice the precision of double leaves too little.
+/// Computes the coordinate at a time after the piece's begin, beyond its end if necessary, with an error of
+/// half a unit of rounding. Returns false if, beyond the end, it is a small difference of numbers so large
+/// that twice the precision of double leaves too few digits.
 template <class S>
 bool extend(const Piece<S>& piece, double t, S& coordinate) {
   const bool beyond = piece.kind == PieceKind::chord && t > piece.t1;
@@ -41,7 +41,7 @@ bool extend(const Piece<S>& piece, double t, S& coordinate) {
   return !beyond;
 }
 
-/// Enlarges a node's box by a vertex.
+/// Extends a node's box to contain a vertex.
 template <class S>
 void enlarge(S* node_bounds, const S* position) {
   for (int axis = 0; axis < 3; ++axis) {
@@ -49,8 +49,8 @@ void enlarge(S* node_bounds, const S* position) {
     node_bounds[axis + 4] = std::max(node_bounds[axis + 4], position[axis]);
   }
 }
-/// Returns whether a line that begins at t can be extended back over the segment: near the segment's end the
-/// rounding of its last position would be multiplied by any number.
+/// Returns whether a line that begins at t can be extended back over the segment. Near the segment's end the
+/// rounding of its last position would be multiplied by an arbitrarily large number.
 bool extends_back(double begin, double t, double end) {
   return t - begin <= 16 * (end - t);
 }
@@ -62,7 +62,8 @@ bool LinearBounds<S>::repair(std::span<const PlanChange<S>> changes) {
   const Segment& segment = segments_[present_];
   const double t = motion_.time();
   if (horizon_.frames() > 0) horizon_.changed();
-  // At the segment's end every vertex is still where it was foreseen, and the next segment knows its plan.
+  // At the segment's end every vertex is still where it was foreseen, and the next segment reads the new
+  // plan.
   if (t == segment.end) return true;
   if (horizon_.frames() == 0 || whole_ || !(segment.begin <= t && t < segment.end) ||
       !extends_back(segment.begin, t, segment.end) || !(segment.end <= t + 2 * horizon_.frames() * step_))
@@ -76,7 +77,7 @@ bool LinearBounds<S>::repair(std::span<const PlanChange<S>> changes) {
   return kept;
 }
 
-/// Puts the vertices of which knots have passed onto their next lines.
+/// Moves the vertices whose knots have passed to their next lines.
 template <class S>
 bool LinearBounds<S>::pass_knots() {
   const double t = motion_.time();
@@ -91,8 +92,8 @@ bool LinearBounds<S>::pass_knots() {
   return remake_boxes();
 }
 
-/// Makes a body's positions at both ends its own, so that single ones can be replaced. Returns false if its
-/// boxes are not: those of a body at rest belong to both ends.
+/// Copies a body's positions at both ends, so that single ones can be replaced. Returns false if the body's
+/// boxes cannot be replaced: those of a body at rest belong to both ends.
 template <class S>
 bool LinearBounds<S>::take_over(std::uint32_t index) {
   LinearBody<S>& body = bodies_[index];
@@ -109,7 +110,7 @@ bool LinearBounds<S>::take_over(std::uint32_t index) {
   return true;
 }
 
-/// Follows a new plan from the present time on. Plans without a knot are read from the change: that costs
+/// Follows a new plan from the current time on. Plans without a knot are read from the change: that costs
 /// less than reading their pieces.
 template <class S>
 void LinearBounds<S>::follow_change(const PlanChange<S>& change) {
@@ -140,9 +141,9 @@ void LinearBounds<S>::follow_pieces(std::uint32_t body, std::uint32_t vertex) {
 }
 
 /// Moves a vertex to the line from `from` at time t to `last` at the segment's end, extended back to the
-/// segment's begin, to P = from - (last - from) * back. At a fraction s after t, the line is off by s times
-/// the rounding of `last` and by 1 - s times that of P: half a unit of each, and for P some roundings in
-/// double of (last - from) * back, which is at most 2 |P| + s |last|.
+/// segment's begin, to P = from - (last - from) * back. At a fraction s after t, the error of the line is s
+/// times the rounding of `last` plus 1 - s times that of P. Each of these is half a unit; P adds some
+/// roundings in double of (last - from) * back, which is at most 2 |P| + s |last|.
 template <class S>
 void LinearBounds<S>::follow_line(std::uint32_t index, std::uint32_t vertex, double t, const S* from,
                                   const S* last) {
@@ -155,7 +156,7 @@ void LinearBounds<S>::follow_line(std::uint32_t index, std::uint32_t vertex, dou
   for (int axis = 0; axis < 3; ++axis) {
     position[0][axis] = S(double(from[axis]) - (double(last[axis]) - double(from[axis])) * back);
     position[1][axis] = last[axis];
-    // A box hides what is no number: the segment does not serve.
+    // A box hides NaN, so the segment cannot be used.
     lost_ = lost_ || !std::isfinite(position[0][axis]) || !std::isfinite(position[1][axis]);
   }
   if (side.apart) {
@@ -167,8 +168,8 @@ void LinearBounds<S>::follow_line(std::uint32_t index, std::uint32_t vertex, dou
   }
 }
 
-/// Makes the boxes of marked leaves and above anew. Returns whether the segment still serves: boxes are in
-/// the range of numbers, and no bodies have come near each other that were apart.
+/// Recomputes the boxes of marked leaves and above. Returns whether the segment can still be used: boxes are
+/// in the range of numbers, and no bodies that were apart have come near each other.
 template <class S>
 bool LinearBounds<S>::remake_boxes() {
   Segment& segment = segments_[present_];
@@ -185,7 +186,7 @@ bool LinearBounds<S>::remake_boxes() {
         arrays.child_bounds = body.child_bounds[end.slot].data();
         arrays.node_bounds = body.node_bounds[end.slot].data();
         refit(arrays, end.positions, nodes.data(), std::uint32_t(nodes.size()));
-        // Rows and slabs of the changed leaves are not current; 0 is the stamp of nothing.
+        // Rows and slabs of the changed leaves are not current; 0 is no valid stamp.
         for (auto* stamps : {&body.stamps[end.slot], &body.block_stamps[end.slot], &body.slab_stamps})
           if (!stamps->empty())
             for (const std::uint32_t leaf : changed_[index].leaves()) (*stamps)[leaf] = 0;
@@ -200,7 +201,7 @@ bool LinearBounds<S>::remake_boxes() {
   return !lost && is_near_as_before();
 }
 
-/// Returns whether all bodies that may meet now are among those that were found to do so.
+/// Returns whether the pairs of bodies that were found near each other include all that may meet now.
 template <class S>
 bool LinearBounds<S>::is_near_as_before() {
   const Segment& segment = segments_[present_];
@@ -219,7 +220,7 @@ bool LinearBounds<S>::is_near_as_before() {
   return true;
 }
 
-/// Returns the share of all leaves that were made anew since the last call.
+/// Returns the share of all leaves that were recomputed since the last call.
 template <class S>
 double LinearBounds<S>::share_made_anew() {
   std::uint64_t all = 1;
@@ -233,7 +234,7 @@ void LinearBounds<S>::clear_changed() {
   for (ChangedParts& parts : changed_) parts.clear();
 }
 
-// The header announces instances of the whole class, so that every member is instantiated where it is
+// The header declares the instances of the whole class, so every member must be instantiated where it is
 // defined.
 template bool LinearBounds<float>::repair(std::span<const PlanChange<float>>);
 template bool LinearBounds<float>::pass_knots();

@@ -18,8 +18,8 @@ struct EndpointBounds {
   const S* positions = nullptr;                             ///< [vertex][3]
   std::uint32_t slot = 0;  ///< index into LinearBody::rows of the data made from the positions
   std::uint32_t made = 0;  ///< a number that identifies the positions
-  /// Upper bound on the excess of a box's side over the tight box, over the largest coordinate that the side
-  /// has had since it was tight.
+  /// Upper bound on the excess of a box's side over the tight box, relative to the largest coordinate that
+  /// the side has had since it was tight.
   S excess = 0;
 };
 
@@ -40,7 +40,7 @@ struct LinearBody {
   std::vector<std::uint32_t> block_stamps[slots];
   UnfilledArray<SpanSlab<S>> slabs;  ///< [leaf]
   std::vector<std::uint32_t> slab_stamps;
-  std::uint32_t slab_stamp = 0, slab_ends[2] = {0, 0};  ///< of the last segment asked for, and its `made`
+  std::uint32_t slab_stamp = 0, slab_ends[2] = {0, 0};  ///< of the last requested segment, and its `made`
 
   WideLinearLeaves<S> leaves(const EndpointBounds<S>& first, const EndpointBounds<S>& last) {
     const std::size_t count = hierarchy.leaf_count();
@@ -54,7 +54,7 @@ struct LinearBody {
             {first.made, last.made},
             {first.positions, last.positions}};
   }
-  /// Returns the same for slabs, of a body of triangles.
+  /// Returns the corresponding data for slabs, of a body of triangles.
   SlabSpanLeaves<S> slab_leaves(const EndpointBounds<S>& first, const EndpointBounds<S>& last) {
     const std::size_t count = hierarchy.leaf_count();
     for (const std::uint32_t slot : {first.slot, last.slot}) {
@@ -119,8 +119,8 @@ struct BodySegmentBounds {
     }
     return box;
   }
-  /// Returns a side, moved outwards by what rounding can do at an end of the segment to it, to the line of a
-  /// vertex below it, and to a position on that line (WideEnds).
+  /// Returns a side, moved outwards by the largest rounding error at an end of the segment: of the side, of
+  /// the line of a vertex below it, and of a position on that line (WideEnds).
   S widened_down(S side) const { return side - end_margin(side); }
   S widened_up(S side) const { return side + end_margin(side); }
   /// Interpolates a box between the ends, moved outwards like the boxes that kernels compute.

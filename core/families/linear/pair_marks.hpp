@@ -5,8 +5,8 @@
 
 namespace kbvh {
 
-/// Marks the pairs of a segment, by their index in the join: those that answers as changes have reported, and
-/// those that may have changed since.
+/// Marks the pairs of a segment, by their index in the join: those that have been reported as changes of
+/// answers, and those that may have changed since.
 class PairMarks {
  public:
   /// Starts a segment: no pair is reported. O(pairs).
@@ -14,9 +14,9 @@ class PairMarks {
     marks_.assign(pairs, 0);
     touched_.clear();
   }
-  /// Adds pairs to the segment, not reported, up to the given number. O(added pairs).
+  /// Adds unreported pairs to the segment, up to the given number. O(added pairs).
   void extend(std::size_t pairs) { marks_.resize(std::max(marks_.size(), pairs), 0); }
-  /// Notes that a pair may have begun or ended.
+  /// Records that a pair may have begun or ended.
   void touch(std::uint32_t pair) {
     if ((marks_[pair] & touched) != 0) return;
     marks_[pair] |= touched;
@@ -31,8 +31,8 @@ class PairMarks {
   /// Keeps the outcome of a test of the pair until the next report.
   void set_hit(std::uint32_t pair) { marks_[pair] |= hit; }
   bool is_hit(std::uint32_t pair) const { return (marks_[pair] & hit) != 0; }
-  /// Calls tell(pair, whether it began) for every touched pair whose membership has changed, as `is_in`
-  /// tells; the pair is then reported, or no longer reported.
+  /// Calls tell(pair, whether it began) for every touched pair whose membership, as given by `is_in`, has
+  /// changed. The pair then counts as reported, or no longer does.
   template <class IsIn, class Tell>
   void report(const IsIn& is_in, const Tell& tell) {
     for (const std::uint32_t pair : touched_) {

@@ -15,7 +15,7 @@ struct SegmentInterval {
 };
 
 /// Returns the interval that contains t, in which every vertex of all `bodies` bodies moves on one line: the
-/// intersection of their segments, cut into `pieces` pieces of equal length. Where no plan ends, the interval
+/// intersection of their segments, cut into `pieces` pieces of equal length. If no plan ends, the interval
 /// lasts for `endless_duration` seconds from t on.
 template <class S>
 SegmentInterval segment_interval(const SegmentMotion<S>& motion, std::uint32_t bodies, double t,

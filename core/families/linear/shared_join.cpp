@@ -92,7 +92,7 @@ void SharedJoin<S>::run(Workers& workers, JoinedColumns& throughout, JoinedColum
       most_partly[kind] += room.partly_count[kind];
     }
   }
-  // Another segment may give all work to one thread: nothing is allocated then.
+  // Another segment may give all work to one thread; no memory is then allocated.
   for (Runner& room : runners_) {
     for (std::size_t kind = 0; kind < kinds; ++kind) {
       room.throughout[kind].view(most[kind], false);
@@ -137,7 +137,7 @@ void SharedJoin<S>::run(Workers& workers, JoinedColumns& throughout, JoinedColum
   });
 }
 
-/// Computes the rows of leaves that no thread has reached since the positions changed, at both ends.
+/// Computes, at both ends, the rows of leaves that no thread has reached since the positions changed.
 template <class S>
 void SharedJoin<S>::claim_leaves(const Batch& batch, Runner& room) {
   const Bodies& bodies = bodies_[batch.traversal];
@@ -190,7 +190,7 @@ void SharedJoin<S>::join_leaves(std::size_t which, std::uint32_t runner) {
   join_some(bodies, room.own_pairs.data(), room.own.size(), room, of_one, nullptr, result);
 }
 
-/// Leaves out pairs of leaves that slabs separate, of `room.leaves`; returns the number of the others.
+/// Leaves out pairs of leaves of `room.leaves` that slabs separate; returns the number of remaining pairs.
 template <class S>
 std::size_t SharedJoin<S>::filter_leaves(const Bodies& bodies, std::size_t count, Runner& room) {
   if (room.masks.size() < count) room.masks.resize(count);

@@ -16,13 +16,13 @@ struct JoinedColumns {
   UnfilledArray<std::uint32_t> primitive_a, primitive_b;
   UnfilledArray<float> begin, end;
 
-  /// Returns the columns with room for some thousand pairs after the first `found`. Only `timed` pairs have a
-  /// begin and an end.
+  /// Returns the columns, with room for some thousand pairs after the first `found`. Only `timed` pairs have
+  /// a begin and an end.
   JoinColumns view(std::size_t found, bool timed);
   std::size_t bytes() const;
 };
 
-/// Keeps the valid pairs within a body among pairs in columns, from a given index on.
+/// From a given index on, keeps only the valid pairs within a body.
 void keep_self_columns(const Primitives* neighbours, LeavesOf leaves, JoinColumns& pairs, std::size_t from);
 
 /// The traversals and leaf tests of an interval join on several threads: the same pairs in the same order,
@@ -30,20 +30,20 @@ void keep_self_columns(const Primitives* neighbours, LeavesOf leaves, JoinColumn
 template <class S>
 class SharedJoin {
  public:
-  /// Starts anew, without bodies.
+  /// Starts over, without bodies.
   void start();
-  /// Adds a pair of bodies, or a body with itself: `bodies` are their arrays, ends and leaves. `neighbours`:
-  /// pairs that share a vertex are left out.
+  /// Adds a pair of bodies, or a body with itself: `bodies` holds their arrays, ends and leaves.
+  /// `neighbours`: pairs that share a vertex are left out.
   void add(const WideLeafJoin<S>& bodies, KernelSet kernels, std::uint32_t padded, bool self,
            const Primitives* neighbours);
-  /// Leaves out what slabs separate, of the pair of bodies that was added last; `slabs` without pairs.
+  /// Leaves out what slabs separate in the pair of bodies that was added last; `slabs` has no pairs.
   void use_slabs(const SlabSpanPairs<S>& slabs) {
     bodies_.back().slabs = slabs;
     bodies_.back().with_slabs = true;
   }
-  /// Joins, and writes the pairs behind those of `throughout` and `partly`; adds the box tests made to
-  /// `tests`. `ends` becomes, for each added pair of bodies, the number of pairs found up to and including
-  /// it.
+  /// Joins, and writes the pairs after those of `throughout` and `partly`; adds the box tests made to
+  /// `tests`. For each added pair of bodies, `ends` receives the number of pairs found up to and including
+  /// that pair.
   struct Ends {
     std::size_t throughout, partly;
   };
@@ -71,7 +71,7 @@ class SharedJoin {
     std::size_t throughout_count[kinds], partly_count[kinds];
     std::uint64_t tests;
   };
-  /// Pairs of a batch: [begin, end) of a runner's columns, and where they go.
+  /// Pairs of a batch: [begin, end) of a runner's columns, and their destination.
   struct Range {
     std::size_t begin, end, to;
   };

@@ -8,12 +8,12 @@
 
 namespace kbvh {
 
-/// Boxes at the end of a segment over which a body translates, from those at its start: all of them, or only
-/// the root's. They contain the same vertices and exceed tight boxes by rounding only.
+/// Computes the boxes at the end of a segment over which a body translates from those at its start: all of
+/// them, or only the root's. They contain the same vertices and exceed tight boxes by rounding only.
 ///
-/// Let s(x) be x plus the step, rounded, which grows with x. A vertex at P moves to s(P), but for an epsilon
-/// of the larger magnitude (FlightPlans::translation): to s(P) - eps max(|P|, |s(P)|) or above, but for eps^2
-/// of it. For the lower side x of a box above it, s(x) - eps max(|x|, |s(x)|) is no larger, again but for
+/// Let s(x) be x plus the step, rounded, which grows with x. A vertex at P moves to s(P), up to an epsilon of
+/// the larger magnitude (FlightPlans::translation): to s(P) - eps max(|P|, |s(P)|) or above, up to eps^2 of
+/// it. For the lower side x of a box above the vertex, s(x) - eps max(|x|, |s(x)|) is no larger, again up to
 /// eps^2 of it; one more rounding follows.
 template <class S>
 struct TranslatedBoxes {

@@ -7,7 +7,7 @@ namespace kbvh {
 namespace {
 /// An upper bound of all rounding of fractions in float.
 constexpr float fraction_slack = 0x1p-21F;
-/// The pairs that one thread attempts at once.
+/// Number of pairs that one thread attempts at once.
 constexpr std::size_t attempts_at_once = 256;
 
 bool differ(const BodyPair& a, const BodyPair& b) {
@@ -15,7 +15,7 @@ bool differ(const BodyPair& a, const BodyPair& b) {
 }
 }  // namespace
 
-/// Enters all pairs into the lists by their start; pairs that overlap at the start are attempted ahead, if
+/// Enters all pairs into the lists by their start. Attempts pairs that overlap at the start ahead of time, if
 /// requested.
 template <class S>
 void TriangleSpanFilter<S>::begin(const IntervalJoin<S>& join, When when) {
@@ -148,7 +148,7 @@ void TriangleSpanFilter<S>::collect_due(const IntervalJoin<S>& join, float fract
   open_.resize(kept);
 }
 
-/// Finds the verdicts on the pairs [begin, end) of those that are due.
+/// Finds the verdicts on the pairs [begin, end) of the due pairs.
 template <class S>
 void TriangleSpanFilter<S>::decide(const LinearSegment<S>& segment, const SceneView<S>& scene,
                                    const IntervalJoin<S>& join, float fraction, float share, S rounding,
@@ -190,7 +190,7 @@ template <class S>
 void TriangleSpanFilter<S>::attempt(const LinearSegment<S>& segment, const SceneView<S>& scene,
                                     const IntervalJoin<S>& join, float fraction, float share) {
   if (due_.empty()) return;
-  // The largest rounding of any body: more leaves more pairs open, but makes no wrong verdict.
+  // The largest rounding of any body: a larger one leaves more pairs open, but makes no wrong verdict.
   S rounding = 0;
   BodyPair last = join.bodies_of(due_[0]);
   const auto take_rounding = [&](const BodyPair& bodies) {
@@ -228,9 +228,9 @@ void TriangleSpanFilter<S>::attempt(const LinearSegment<S>& segment, const Scene
   due_.resize(left);
 }
 
-/// When a proof expires, retries the remaining span, then its first quarter, and that quarter's first quarter
-/// as long as several frames lie in it. An attempt costs as much as the tests of several frames, so a pair
-/// stays open to its end if no other frame lies in the quarter.
+/// When a proof expires, retries the remaining span, then its first quarter, then that quarter's first
+/// quarter, as long as several frames lie in it. An attempt costs as much as the tests of several frames, so
+/// a pair stays open to its end if no other frame lies in the quarter.
 template <class S>
 void TriangleSpanFilter<S>::attempt_all(const LinearSegment<S>& segment, const SceneView<S>& scene,
                                         const IntervalJoin<S>& join, float fraction) {

@@ -8,10 +8,10 @@
 
 namespace kbvh {
 
-/// Returns the rounding for SpanTestKernels where lines are off the positions at the ends of a segment by
-/// this share (WideEnds). Each of two corners is off by that, by half a unit at a frame, and as interpolated
-/// by one for the difference of its two ends, one for a product and half a unit for the sum; the difference
-/// of the corners by one, and there is one more for products of roundings. A unit is two `unit_rounding`.
+/// Returns the rounding for SpanTestKernels when lines differ from the positions at the ends of a segment by
+/// this share (WideEnds). Each of two corners has this error, half a unit at a frame, and as interpolated one
+/// unit for the difference of its two ends, one for a product and half a unit for the sum. The difference of
+/// the corners adds one, and products of roundings one more. A unit is two `unit_rounding`.
 template <class S>
 constexpr S span_rounding(S rounding) {
   return 2 * rounding + 16 * unit_rounding<S>;
@@ -41,7 +41,7 @@ class TriangleSpanFilter {
   std::size_t read(const LinearSegment<S>& segment, const SceneView<S>& scene, const IntervalJoin<S>& join,
                    float fraction, PairBuffer& out);
   /// Does the same without the list: O(pairs whose state changes or is open). Afterwards the functions below
-  /// tell the states.
+  /// return the states.
   void move_to(const LinearSegment<S>& segment, const SceneView<S>& scene, const IntervalJoin<S>& join,
                float fraction);
   /// Follows a repair of the join.
@@ -57,11 +57,11 @@ class TriangleSpanFilter {
   /// Touches these marks whenever the state of a pair changes, until the next start.
   void follow(const FollowingMarks& marks) { following_ = marks; }
 
-  /// Decides pairs on these threads from now on, with the same verdicts.
+  /// From now on decides pairs on these threads, with the same verdicts.
   void use(Workers& workers) { workers_ = &workers; }
 
-  /// Return the attempts to decide a pair for a span, and the pairs that frames reported as decided, since
-  /// `start_over`, which also forgets the step between frames.
+  /// Return the number of attempts to decide a pair for a span, and of the pairs that frames reported as
+  /// decided, since `start_over`, which also forgets the step between frames.
   std::uint64_t attempts() const { return attempts_; }
   std::uint64_t decided() const { return decided_; }
   void start_over() {
@@ -87,7 +87,7 @@ class TriangleSpanFilter {
   void cease_to_intersect(std::uint32_t pair);
   void leave_open(std::uint32_t pair, float until);
   bool is_due(std::uint32_t pair, float fraction) const {
-    // A proof that a pair intersects holds to the end of its span, that instant included: the span may end
+    // A proof that a pair intersects holds to the end of its span, including that instant: the span may end
     // with the segment, at a frame.
     return state_[pair] == State::intersecting ? time_[pair] < fraction : time_[pair] <= fraction;
   }

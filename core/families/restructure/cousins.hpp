@@ -8,8 +8,8 @@
 namespace kbvh {
 
 /// The grandchildren of a node, and the exchange of two of them that saves most surface: a tree rotation for
-/// wide nodes (Kopta et al. 2012 rotate binary ones). Cousins are exchanged, and not a child with a
-/// grandchild, so that all leaves keep their depth. The node's own box, and those of its grandchildren, stay.
+/// wide nodes (Kopta et al. 2012 rotate binary ones). Exchanging two cousins, instead of a child and a
+/// grandchild, keeps the depth of all leaves. The node's own box, and those of its grandchildren, stay.
 template <class S>
 class Cousins {
  public:
@@ -29,7 +29,7 @@ class Cousins {
     return families_ > 1;
   }
 
-  /// Finds the best exchange. O(width^4) operations, of which one vector does `width`.
+  /// Finds the best exchange. O(width^4) operations; one vector performs `width` of them.
   Exchange best() const {
     Exchange best{0, 0, 0};
     for (std::uint32_t i = 0; i < families_; ++i)
@@ -45,8 +45,8 @@ class Cousins {
   /// The children of one child: rows lower x, y, z, -upper x, y, z; empty lanes hold infinity.
   struct Family {
     S box[6][width];
-    S rest[6][width];  ///< box of all the others
-    S surface;         ///< half of that of the whole
+    S rest[6][width];  ///< box of all other children
+    S surface;         ///< half of the whole box's surface
     std::uint32_t first, count;
     bool leaf[width];
   };

@@ -60,10 +60,10 @@ std::uint32_t DynamicTree<S>::new_node() {
   return node;
 }
 
-/// Descends to where a new leaf makes the sum of surface areas grow least, greedily: a parent for the leaf
-/// and the node costs their common area, and a step down costs what the node grows by. Of children that cost
-/// the same, as both do that contain the leaf, the one with the nearer centre is taken, and of these the
-/// lower one.
+/// Descends greedily to the place where a new leaf adds least to the sum of surface areas: a new parent for
+/// the leaf and the node costs their common area, and a step down costs the growth of the node. Among
+/// children of equal cost, as when both contain the leaf, takes the one with the nearer centre, and if these
+/// are equal, the lower one.
 template <class S>
 std::uint32_t DynamicTree<S>::best_sibling(const Box<S>& box) {
   std::uint32_t index = root_;
@@ -161,8 +161,8 @@ void DynamicTree<S>::exchange(std::uint32_t node, std::uint32_t down, std::uint3
   join(middle);
 }
 
-/// Lifts the higher child of the higher child until the heights of the children are as close as they have to
-/// be. One exchange suffices after a change by one level; what it puts together may need others.
+/// Lifts the higher child of the higher child until the children's heights differ by no more than allowed.
+/// One exchange suffices after a change by one level; the joined subtrees may need further ones.
 template <class S>
 void DynamicTree<S>::balance(std::uint32_t node) {
   for (;;) {
@@ -177,8 +177,8 @@ void DynamicTree<S>::balance(std::uint32_t node) {
   }
 }
 
-/// Exchanges a child with a child of the other child if that makes the other child's box smaller; the best of
-/// the four exchanges, among those that keep the heights close.
+/// Exchanges a child with a child of the other child if that makes the other child's box smaller; takes the
+/// best of the four exchanges that keep the heights close.
 template <class S>
 void DynamicTree<S>::rotate(std::uint32_t node) {
   const std::uint32_t children[2] = {nodes_[node].first, nodes_[node].second};

@@ -13,10 +13,10 @@ namespace kbvh {
 /// one, and rotations on the way up keep it good (Catto 2019, as in Box2D). Leaves hold boxes that are larger
 /// than their primitives. Ids of nodes are recycled; memory grows only with the number of primitives.
 ///
-/// Surface areas alone make a chain of boxes that are equal or lie in each other. So the heights of two
-/// siblings never differ by more than `slack`: the depth is at most 3.6 log2(primitives), up to a constant,
-/// because a tree of height h has at least as many leaves as those of height h - 1 and h - 1 - slack
-/// together.
+/// Surface areas alone make a chain of boxes that are equal or lie in each other. Therefore the heights of
+/// two siblings never differ by more than `slack`. This limits the depth to 3.6 log2(primitives), up to a
+/// constant, because a tree of height h has at least as many leaves as trees of heights h - 1 and h - 1 -
+/// slack together.
 template <class S>
 class DynamicTree {
  public:
@@ -35,7 +35,7 @@ class DynamicTree {
   void clear(std::uint32_t primitives);
   /// Makes room for more ids.
   void grow(std::uint32_t primitives);
-  /// Adds a primitive that is not in the tree. O(log n).
+  /// Inserts a primitive that is not in the tree. O(log n).
   void insert(std::uint32_t primitive, const Box<S>& box);
   /// Removes a primitive that is in the tree. O(log n).
   void remove(std::uint32_t primitive);

@@ -8,16 +8,16 @@
 
 namespace kbvh {
 
-/// Restructures one body's hierarchy by exchanging the primitives of its leaves, while its nodes and the
-/// number of primitives in every leaf stay as they were built. After a sort the tree is the one that the
-/// median builder makes over the same shape, memory is in the order of the leaves, and nothing was allocated.
+/// Restructures one body's hierarchy by exchanging the primitives of its leaves, while the nodes and the
+/// number of primitives in every leaf stay as built. After a sort the tree is the one that the median builder
+/// makes over the same shape, memory is in the order of the leaves, and nothing was allocated.
 ///
 /// Every function changes the hierarchy through `WideHierarchy::refill`, after which the hierarchy must be
 /// refitted.
 template <class S>
 class LeafContents {
  public:
-  /// Takes the shape of a hierarchy; to be called again after each change of its topology by others.
+  /// Takes the shape of a hierarchy; to be called again after each change of its topology by other code.
   /// O(nodes).
   void prepare(const WideHierarchy<S>& hierarchy);
 
@@ -25,18 +25,18 @@ class LeafContents {
   /// n) for n primitives below.
   void sort_primitives(WideHierarchy<S>& hierarchy, const Primitives& primitives, const S* positions,
                        std::span<const std::uint32_t> nodes);
-  /// The same for the whole tree, in parts: takes the positions of the first call, and changes the hierarchy
-  /// in the call that ends the sort. `work` is that of MedianSort::run. Returns whether the sort has ended;
-  /// in a tree of one node or none there is nothing to sort.
+  /// Does the same for the whole tree, in parts: takes the positions of the first call, and changes the
+  /// hierarchy in the call that ends the sort. `work` is that of MedianSort::run. Returns whether the sort
+  /// has ended; a tree of at most one node needs no sort.
   bool sort_in_parts(WideHierarchy<S>& hierarchy, const Primitives& primitives, const S* positions,
                      std::uint64_t work);
   bool in_parts() const { return in_parts_; }
-  /// Gives up a sort in parts.
+  /// Abandons a sort in parts.
   void stop();
 
-  /// Takes the primitives out of the `count` largest leaves, sorts them into new leaves, and sorts all leaves
-  /// as wholes into the tree, by their boxes in the hierarchy. Leaves that hold fewer primitives than the
-  /// topology's leaf size stay where they are. O(leaves log leaves + n log n) for n primitives taken out.
+  /// Takes the primitives out of the `count` largest leaves, sorts them into new leaves, and sorts all
+  /// leaves, as units, into the tree, by their boxes in the hierarchy. Leaves that hold fewer primitives than
+  /// the topology's leaf size stay in place. O(leaves log leaves + n log n) for n primitives taken out.
   void renew_leaves(WideHierarchy<S>& hierarchy, const Primitives& primitives, const S* positions,
                     std::uint32_t count);
   std::uint32_t full_leaf_count() const { return std::uint32_t(full_.size()); }

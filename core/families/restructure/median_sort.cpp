@@ -115,7 +115,7 @@ void MedianSort::divide(std::uint32_t begin, std::uint32_t middle, std::uint32_t
     return;
   }
   const auto less = [axis](const Item& a, const Item& b) { return a.key[axis] < b.key[axis]; };
-  // Finds the bin of the first item right of the middle. A short range is one bin.
+  // Finds the bin of the first item to the right of the middle. A short range is one bin.
   const int shift =
       from.size() <= short_range ? 32 : std::max(0, int(std::bit_width(extent.size)) - int(bin_bits));
   std::uint64_t first_of_bin = lower, end_of_bin = std::uint64_t(lower) + extent.size + 1;
@@ -130,7 +130,7 @@ void MedianSort::divide(std::uint32_t begin, std::uint32_t middle, std::uint32_t
     end_of_bin = first_of_bin + (std::uint64_t(1) << shift);
   }
   // Writes every item to all three places and advances one of them, without a branch that depends on keys.
-  // The last place may be one behind the range, where another range lies.
+  // The last place may be one past the range, where another range lies.
   const Item behind = to[from.size()];
   Item *smaller = to, *larger = to + before + inside, *middle_items = middle_.data();
   for (const Item& item : from) {
@@ -146,7 +146,7 @@ void MedianSort::divide(std::uint32_t begin, std::uint32_t middle, std::uint32_t
   to[from.size()] = behind;
   std::copy_n(middle_.begin(), inside, to + before);
   if (before == left || is_divided({to + before, inside}, left - before, axis)) return;
-  // Items of equal keys keep no order here, but the same one at every run.
+  // Items with equal keys are not sorted, but get the same order in every run.
   std::nth_element(to + before, to + left, to + before + inside, less);
 }
 

@@ -39,13 +39,13 @@ class MedianSort {
   /// Returns the items by slot: to be written before, and to be read after a sort.
   std::span<Item> items() { return items_[0]; }
 
-  /// Starts to sort the items in the slots below a node. `topology` and `slots` must stay as they are until
-  /// `run` has ended.
+  /// Starts to sort the items in the slots below a node. `topology` and `slots` must not change until `run`
+  /// has ended.
   void start(const Topology& topology, const SlotRanges& slots, std::uint32_t node);
   /// Continues for about `work` steps, one per item and division. Returns whether the sort has ended.
   bool run(std::uint64_t work = unlimited);
   bool running() const { return !open_.empty(); }
-  /// Gives up a sort that was interrupted.
+  /// Abandons an interrupted sort.
   void stop() { open_.clear(); }
 
   /// Sorts the items of a range of slots into groups of equal size, the last of which may be smaller.
@@ -84,7 +84,7 @@ class KeyGrid {
     }
     scale_ = extent > 0 ? most / extent : S(0);
   }
-  /// Sets an item's keys from the middle of a box. What lies outside the grid counts as at its rim.
+  /// Sets an item's keys from the middle of a box. Anything outside of the grid counts as on its border.
   void put(const LaneBox<S>& box, MedianSort::Item& item) const {
     typename LaneBox<S>::Lanes at[LaneBox<S>::parts];
     for (int i = 0; i < LaneBox<S>::parts; ++i) {

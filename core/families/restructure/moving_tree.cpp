@@ -41,7 +41,7 @@ void MovingTree<S>::assign(const Topology& topology, const Primitives& primitive
   this->primitives_ = topology.primitives;
   this->list_corners(primitives);
 
-  // A root that is a leaf still needs a node to lie in.
+  // A root that is a leaf still needs a node to hold it.
   new_block(none);
   std::vector<std::uint32_t> number(topology.size(), 0);
   const S infinity = std::numeric_limits<S>::infinity();
@@ -87,8 +87,8 @@ ReinsertionSearch<S> MovingTree<S>::best_place(std::uint32_t node, std::uint32_t
   return job;
 }
 
-/// The child is at both places until it is taken out of the first, so that no number changes between but its
-/// own.
+/// The child is at both places until it is taken out of the first one, so that no other node's number changes
+/// in between.
 template <class S>
 void MovingTree<S>::move(const ReinsertionSearch<S>& found) {
   std::uint32_t from = found.node;
@@ -105,7 +105,7 @@ void MovingTree<S>::move(const ReinsertionSearch<S>& found) {
                                   std::to_string(found.target));
   const std::uint32_t to = found.target_lane == into ? found.target : pair_place(found);
   if (to == from && to != found.target)
-    from = this->nodes_[to].first_child;  // beside the node that it leaves
+    from = this->nodes_[to].first_child;  // next to the node that it leaves
   put_child(to, leaf, child, box);
   box_changed(to);
   settle(to);
@@ -158,7 +158,7 @@ void MovingTree<S>::put_child(std::uint32_t node, std::uint32_t leaf, std::uint3
     move_node(child, add_inner(node, box));
 }
 
-/// Returns whether a node's children are better placed in its parent: they are if the node has one only.
+/// Returns whether a node's children are better placed in its parent, as an only child always is.
 template <class S>
 bool MovingTree<S>::absorbs(std::uint32_t node, S lane_price) {
   if (node == 0) return false;
@@ -168,7 +168,7 @@ bool MovingTree<S>::absorbs(std::uint32_t node, S lane_price) {
   return surface(node) * (1 + lane_price * S(count)) > surface(above) * lane_price * S(count - 1);
 }
 
-/// Gives a node's children to its parent, in place of the node. The parent's box stays.
+/// Moves a node's children to its parent, in place of the node. The parent's box stays.
 template <class S>
 void MovingTree<S>::absorb(std::uint32_t node) {
   const std::uint32_t above = parent(node);
@@ -181,7 +181,7 @@ void MovingTree<S>::absorb(std::uint32_t node) {
   }
   order_.remove(node);
   this->nodes_[node] = {};
-  // The node's number goes first: its parent may have no room for one child more.
+  // Removes the node's number first: its parent may have no room for another child.
   remove_inner(above, node);
   for (std::uint32_t lane = 0; lane < content.leaf_count; ++lane) add_leaf(above, leaves[lane], boxes[lane]);
   for (std::uint32_t lane = content.leaf_count; lane < content.count; ++lane)
@@ -249,7 +249,7 @@ void MovingTree<S>::make_node(std::uint32_t node) {
   std::fill_n(rows(node), lane_scalars(8), std::numeric_limits<S>::infinity());
 }
 
-/// Gives a node another number, at which there is none. The parents' rows stay.
+/// Gives a node another, unused number. The parents' rows stay.
 template <class S>
 void MovingTree<S>::move_node(std::uint32_t from, std::uint32_t to) {
   const WideNode content = std::exchange(this->nodes_[from], {});
@@ -351,7 +351,7 @@ std::uint32_t MovingTree<S>::add_inner(std::uint32_t index, const S* box) {
   return node.first_child + inner_count(node) - 1;
 }
 
-/// Closes the gap of a child that is no node any more.
+/// Closes the gap of a child that is no longer a node.
 template <class S>
 void MovingTree<S>::remove_inner(std::uint32_t index, std::uint32_t child) {
   WideNode& node = this->nodes_[index];

@@ -13,10 +13,10 @@
 
 namespace kbvh {
 
-/// One body's 8-wide tree in which a child of any node can move to any other place, with all that lies below
-/// it. A move writes the two nodes that lose and get a child, and the boxes above them; nothing else changes
-/// its place in memory but a node among its siblings. Every node has room for 8 children from the start:
-/// nodes below one parent lie in a block of 8 numbers, and leaf `lane` of node n has the number 8 n + lane.
+/// One body's 8-wide tree in which a child of any node can move to any other place, together with everything
+/// below it. A move writes the two nodes that lose and get a child, and the boxes above them; only siblings
+/// may move in memory. Every node has room for 8 children from the start: nodes with the same parent lie in a
+/// block of 8 numbers, and leaf `lane` of node n has the number 8 n + lane.
 ///
 /// Leaves keep their primitives. Boxes are exact after every move if they were before.
 template <class S>
@@ -31,32 +31,32 @@ class MovingTree : public WideTree<S> {
   /// Recomputes all boxes from positions [vertex][3]. O(nodes + vertices of leaves).
   void refit(const S* positions);
 
-  /// Finds the best place for a child of a node, which is not its only one; `gain` of the result is 0 if
-  /// there is none better, or if the child is one of two of the root. `lane_price`, `least` and `most_visits`
-  /// are those of ReinsertionSearch. Boxes must be current.
+  /// Finds the best place for a child of a node; the child must not be an only child. The result's `gain` is
+  /// 0 if no place is better, or if the child is one of the root's only two. `lane_price`, `least` and
+  /// `most_visits` are those of ReinsertionSearch. Boxes must be current.
   ReinsertionSearch<S> best_place(std::uint32_t node, std::uint32_t lane, S lane_price, S least,
                                   std::uint32_t most_visits);
-  /// Moves a child as the search found; also takes out the node that it leaves, if its other children are
-  /// worth more above, or there is one only. Throws std::invalid_argument, and changes nothing, if the place
-  /// lies below the child. O(8 x depth). Allocates where it needs more blocks than ever before.
+  /// Moves a child to the place found. Also removes the node that it leaves if its other children are better
+  /// placed above, or if only one remains. Throws std::invalid_argument, and changes nothing, if the place
+  /// lies below the child. O(8 x depth). Allocates if it needs more blocks than ever before.
   void move(const ReinsertionSearch<S>& found);
-  /// Writes the gains of taking out each of the 8 children of a node, as ReinsertionKernels does.
+  /// Writes the gains of taking out each of the 8 children of a node, like ReinsertionKernels.
   void gains(std::uint32_t node, S* gains) {
     reinsertion_kernels<S>(this->kernels_).gains(this->arrays(), node, gains);
   }
-  /// Writes by how much nodes have grown since they settled, as ReinsertionKernels does.
+  /// Writes how much nodes have grown since they settled, like ReinsertionKernels.
   double growths(std::span<const std::uint32_t> nodes, S growth, S* scores) {
     return reinsertion_kernels<S>(this->kernels_)
         .growths(this->arrays(), nodes.data(), std::uint32_t(nodes.size()), settled_.data(), growth, scores);
   }
-  /// Notes that a node, or all, are as good now as they can be.
+  /// Records that a node, or all nodes, cannot be improved at present.
   void settle(std::uint32_t node) { settled_[node] = surface(node); }
   void settle();
 
   /// Returns the nodes, children before their parents.
   std::span<const std::uint32_t> nodes() const { return order_.nodes(); }
 
-  /// Returns the count of numbers in use or free: nodes are below it.
+  /// Returns the number of node numbers, used or free; nodes have smaller numbers.
   std::uint32_t numbers() const { return std::uint32_t(this->nodes_.size()); }
   std::uint32_t node_count() const { return std::uint32_t(order_.nodes().size()); }
   const WideNode& node(std::uint32_t index) const { return this->nodes_[index]; }
@@ -64,8 +64,8 @@ class MovingTree : public WideTree<S> {
 
   /// Returns the tree as a topology, and the box of each node. O(nodes).
   Topology topology(std::vector<Box<double>>& boxes) const;
-  /// Checks that nodes, blocks, leaves and the order of the refit fit together. Returns an empty text, or the
-  /// first fault. O(nodes).
+  /// Checks that nodes, blocks, leaves and the order of the refit are consistent. Returns an empty text, or
+  /// the first fault. O(nodes).
   std::string check() const;
 
   std::size_t bytes() const;

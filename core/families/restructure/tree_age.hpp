@@ -6,25 +6,25 @@
 
 namespace kbvh {
 
-/// The age of a tree as queries feel it: the box tests that they made beyond those of the tree when it was
-/// new.
+/// The age of a tree, measured by its queries: the box tests that they made beyond those of the tree when it
+/// was new.
 ///
-/// The number of pairs of primitives whose boxes overlap does not depend on the tree, nor does the number of
-/// rays that enter the body's box. A new tree is therefore expected to need as many tests per such pair or
-/// ray, and per frame, as in its first frame. When the surplus summed over frames has cost as much as a
-/// rebuild, a rebuild is due: for a surplus that grows linearly this is the period of least total cost. The
-/// unit of all work is a box test of a search for pairs; one of a ray counts as costs::Ageing::ray_test.
+/// The number of pairs of primitives whose boxes overlap does not depend on the tree, and neither does the
+/// number of rays that enter the body's box. A new tree is therefore expected to need as many tests per such
+/// pair or ray, and per frame, as in its first frame. When the surplus summed over frames has cost as much as
+/// a rebuild, a rebuild is due: for a surplus that grows linearly this is the period of least total cost. The
+/// unit of all work is a box test of a search for pairs; a box test of a ray counts as
+/// costs::Ageing::ray_test.
 class TreeAge {
  public:
-  /// Registers a new tree: the next frame says what it needs.
+  /// Registers a new tree: the next frame measures how many tests it needs.
   void renew() {
     growth_ = growth_now();
     lasted_ = frames_;
     surplus_ = frames_ = 0;
     pairs_.is_new = rays_.is_new = true;
   }
-  /// Registers a tree that was improved, but not made anew. What it needs is still known, and forgotten
-  /// slowly.
+  /// Registers a tree that was improved but not rebuilt. Its former need is kept, and slowly forgotten.
   void repair() {
     surplus_ = frames_ = 0;
     pairs_.per_found *= 1.05;
@@ -36,13 +36,13 @@ class TreeAge {
   void add_rays(std::uint64_t tests, std::uint64_t rays) { rays_.add(tests, rays); }
   /// Ends the current frame and returns the surplus since the tree was new, in box tests.
   double end_frame() {
-    // 1000 pairs stand for the traversal of bodies without contact; a ray that meets no box makes no tests.
+    // 1000 pairs represent the traversal of bodies without contact; a ray that meets no box makes no tests.
     surplus_ += pairs_.end_frame(1000) + costs::Ageing::ray_test * rays_.end_frame(1);
     ++frames_;
     return surplus_;
   }
-  /// Returns by how many box tests the surplus of a frame grows from frame to frame: of this tree, or, while
-  /// it is younger than the one before was, of that one.
+  /// Returns the growth of the surplus, in box tests per frame: of this tree, or, while it is younger than
+  /// its predecessor became, of the predecessor.
   double growth() const { return frames_ < lasted_ ? growth_ : growth_now(); }
 
  private:
@@ -61,7 +61,7 @@ class TreeAge {
       double surplus = 0;
       if (tests > 0) {  // otherwise no query came to the body
         const double needed = tests / (found + quiet);
-        // A tree whose first frame was a bad one is measured against its best.
+        // A tree with an unusually bad first frame is measured against its best frame.
         per_found = is_new ? needed : std::min(per_found, needed);
         is_new = false;
         surplus = std::max(0.0, tests - per_found * (found + quiet));
@@ -70,7 +70,7 @@ class TreeAge {
       return surplus;
     }
   };
-  /// A surplus that grows by this at each frame adds up to `surplus_`.
+  /// Returns the growth per frame that adds up to `surplus_`.
   double growth_now() const { return frames_ > 0 ? 2 * surplus_ / (frames_ * frames_) : 0; }
 
   Work pairs_, rays_;

@@ -78,7 +78,7 @@ class LeafOverlaps {
     }
   }
 
-  /// Starts to note the primitive pairs that begin and end, until `clear`.
+  /// Starts to record the primitive pairs that begin and end, until `clear`.
   void start_noting() {
     notes_changes_ = true;
     changes_.clear();
@@ -129,7 +129,7 @@ class LeafOverlaps {
     changes_.push_back({pair, by});
     if (changes_.size() >= add_up_at_) add_up_changes();
   }
-  /// Keeps one change of each pair, and none if it is as before.
+  /// Keeps one change of each pair, and none if the pair is in its former state.
   void add_up_changes() {
     std::sort(changes_.begin(), changes_.end(),
               [](const Change& a, const Change& b) { return a.pair < b.pair; });
@@ -157,7 +157,7 @@ class LeafOverlaps {
   std::vector<EndedOverlap> ended_;
   bool notes_changes_ = false;
   std::vector<Change> changes_;
-  std::size_t add_up_at_ = 1024;  ///< bounds the list where no changes are asked
+  std::size_t add_up_at_ = 1024;  ///< bounds the list if no changes are requested
 };
 
 }  // namespace kbvh

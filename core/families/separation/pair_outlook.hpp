@@ -120,7 +120,7 @@ class PairOutlook {
   }
   /// Returns the gaps (SegmentOverlap) that a changed box may have shrunk, seen from the pairs that have the
   /// box on the given side. Between changes of plans, a new realiser is ahead of the old one until the
-  /// segment ends. It can therefore shrink a gap only by the rounding of the inflation, or before the present
+  /// segment ends. It can therefore shrink a gap only by the rounding of the inflation, or before the current
   /// time. In a body with plans of its own, any gap may shrink or grow.
   std::uint8_t changed_gaps(const ChangedBoxes::Box& box, int side) const {
     if (!by_segments_ || box.side == ChangedBoxes::all_sides || bodies_[box.body].plans->has_own_plans())
@@ -189,7 +189,7 @@ class PairOutlook {
   SegmentBoxes<S> boxes_;
   bool by_segments_ = false;
   std::vector<BodyPlans> bodies_;
-  /// In a set of gaps: the bit of all other reasons to decide a pair anew; every decision depends on it.
+  /// In a set of gaps: the bit of all other reasons to decide a pair again; every decision depends on it.
   static constexpr std::uint8_t other_reasons = 0x40;
   static constexpr std::uint8_t all_reasons = other_reasons | SegmentOverlap<S>::all_gaps;
 

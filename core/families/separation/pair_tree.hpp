@@ -252,8 +252,8 @@ class PairTree {
   /// Replaces `tops` by the highest pairs that have a changed node and will stay. A pair with a gone node
   /// does not stay, and nothing below it stays; its nearest ancestor without a gone node counts as changed.
   /// The search uses only the tree of pairs, which still represents the trees before the change, whatever the
-  /// ids mean now. An id that lost its meaning then lay below a node that the trees have reported. O(pairs
-  /// that have a changed node, times the depth).
+  /// ids mean now. An id that lost its meaning lay below a node that the trees have reported. O(pairs that
+  /// have a changed node, times the depth).
   void find_highest_changed(std::span<const ChangedBoxes::Node> nodes, std::vector<std::uint32_t>& tops) {
     for (const auto& changed : nodes) {
       if (!changed.gone) continue;

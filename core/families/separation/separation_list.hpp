@@ -18,7 +18,7 @@ namespace kbvh {
 /// The work of a separation list after a change of geometry, in pairs.
 struct ListEdit {
   std::uint64_t removed = 0;  ///< removed from the tree of pairs
-  std::uint64_t decided = 0;  ///< decided anew: new pairs, pairs with other children, pairs with other boxes
+  std::uint64_t decided = 0;  ///< decided again: new pairs, pairs with other children, pairs with other boxes
 };
 
 /// The separation list of kinetic incremental collision detection (Z&W s.7), for body pairs of a scene: the
@@ -36,14 +36,15 @@ struct ListEdit {
 /// If the event is too far ahead, the pair has a review instead, at which only its next event is searched
 /// (OverlapClock). A review counts as an operation on the queue.
 /// When a box changes ("BV change": a new realiser, or a new plan of a realiser), the pairs that have the box
-/// are decided anew, unless the change cannot affect their decision.
+/// are decided again, unless the change cannot affect their decision.
 ///
 /// Insertions and deletions change the trees below a few nodes. The pairs of such a node stay, the pairs
-/// below them are removed, and the remaining pairs are decided anew on the changed trees. A pair of a removed
-/// node lies below a pair of the node's former parent, which counts as changed. No other pair is examined.
+/// below them are removed, and the remaining pairs are decided again on the changed trees. A pair of a
+/// removed node lies below a pair of the node's former parent, which counts as changed. No other pair is
+/// examined.
 ///
-/// Within one body, a node always overlaps itself, which needs no event. Below such a self pair stand the
-/// pairs of two of its children, one for every two. These pairs are roots of the tree of pairs; the list is
+/// Within one body, a node always overlaps itself, which needs no event. Below such a self pair there is one
+/// pair for every two of the node's children. These pairs are roots of the tree of pairs; the list is
 /// therefore never shorter than the number of inner nodes of the tree. The pair of a leaf with itself is in
 /// no list.
 ///
@@ -193,12 +194,12 @@ class SeparationList {
     return std::any_of(boxes.begin(), boxes.end(),
                        [&](const auto& box) { return tree_.has_pairs(box.body, box.node); });
   }
-  /// Decides anew the pairs of boxes that have changed at `now`, if the change affects their decision. Boxes
+  /// Decides again the pairs of boxes that have changed at `now`, if the change affects their decision. Boxes
   /// may be listed twice.
   void boxes_changed(std::span<const ChangedBoxes::Box> boxes, const Moment<S>& now) {
     time_ = now.instant.begin;
     end_ = now.instant.end;
-    // A node that a change of geometry removed has no pairs any more.
+    // A node that a change of geometry removed no longer has pairs.
     for (const auto& box : boxes) {
       affected_.clear();
       std::size_t pairs = 0;

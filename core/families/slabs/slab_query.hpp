@@ -31,9 +31,9 @@ class SlabBlocks {
 };
 
 /// Queries two hierarchies of triangles, or one with itself: boxes down to the leaves, then in each pair of
-/// leaves those triangles whose boxes overlap and of which each meets the other leaf's slab, the space
-/// between two parallel planes that contains the leaf. A pair of triangles that share a point passes. Keeps
-/// its buffers from frame to frame.
+/// leaves the triangles whose boxes overlap and which meet the other leaf's slab, the space between two
+/// parallel planes that contains the leaf. Pairs of triangles that share a point are never lost. Keeps its
+/// buffers from frame to frame.
 template <class S>
 class SlabQuery {
  public:
@@ -46,15 +46,16 @@ class SlabQuery {
     SlabBlocks<S>* blocks;
     const S* positions;
   };
-  /// Appends the pairs. Returns the work that the budget left undone; adds the box tests made, those of
-  /// triangles against slabs included, to `tests`. `rounding` as in SlabLeafPairs; less is a fault.
+  /// Appends the pairs. Returns the work that the budget left undone; adds the box tests made, including
+  /// those of triangles against slabs, to `tests`. `rounding` as in SlabLeafPairs; smaller values are a
+  /// fault.
   QueryStatus run(const Side& a, const Side& b, PairBuffer& out, std::uint64_t& tests, const Budget& budget,
                   S rounding = enough_rounding);
-  /// The product of a direction and a corner, three products and two sums in S, is off by less than 3.1
-  /// half units of the leaf's largest coordinate, for the direction's components add up to 1, and one more is
-  /// for the sum of a bound and the slack: half of this at most.
+  /// The product of a direction and a corner, three products and two sums in S, has an error below 3.1 half
+  /// units of the leaf's largest coordinate, because the direction's components add up to 1. One more is for
+  /// the sum of a bound and the slack: at most half of this value.
   static constexpr S enough_rounding = 4 * std::numeric_limits<S>::epsilon();
-  /// Returns the pairs of leaves compared so far, and those of which a slab has left nothing.
+  /// Returns the pairs of leaves compared so far, and those that a slab separated completely.
   std::uint64_t leaf_pairs() const { return leaf_pairs_seen_; }
   std::uint64_t separated() const { return separated_; }
   void clear_counts() { leaf_pairs_seen_ = separated_ = 0; }

@@ -10,7 +10,7 @@ namespace kbvh {
 
 /// A strategy with stored boxes (`Base`: StoredHierarchyStrategy or FixedPlansHierarchyStrategy) whose query
 /// compares the slabs of leaves where both bodies consist of triangles, and boxes otherwise. Slabs are made
-/// where a query needs them; whoever overrides `reset_to` or `advance_to` calls
+/// when a query needs them; classes that override `reset_to` or `advance_to` must call
 /// `blocks_[body].positions_changed()`.
 template <class S, class Base>
 class SlabStrategy : public Base {
@@ -58,7 +58,7 @@ class SlabStrategy : public Base {
   }
 
  protected:
-  /// Finds the bodies that have slabs: those of triangles. Where a leaf is one triangle, its box is the
+  /// Finds the bodies that have slabs: those of triangles. If a leaf is one triangle, its box is the
   /// triangle's, and a slab would add nothing.
   void find_accepted() {
     accepted_.clear();

@@ -48,18 +48,18 @@ struct EndOrder {
 /// Each two neighbours have a certificate: the time at which they exchange their places. Two lines meet once,
 /// so the certificates are found without a search, and a pair of ends exchanges its places at most once in a
 /// segment. The certificates wait in bins of equal spans of time. A frame opens the bins up to its time, and
-/// performs what is due in any order: the sorted list of a time does not depend on the order of the swaps
-/// before it, so no queue sorts events. Whether a swap is due is decided exactly: its time, a fraction of the
-/// segment, is known up to 2^-50, and closer cases are decided by exact arithmetic.
+/// performs the due swaps in any order: the sorted list at a time does not depend on the order of earlier
+/// swaps, so no queue sorts events. Whether a swap is due is decided exactly: its time, a fraction of the
+/// segment, is known up to 2^-50, and exact arithmetic decides closer cases.
 ///
 /// Every exchange of neighbours is reported as on_swap(low, high): the end `low` was below `high` and is now
-/// above. Its order is that of the list, so that ranks are those after the exchange.
+/// above. Swaps are reported in the list's order, so ranks are those after the exchange.
 template <class S, class Rule = EndOrder>
 class KineticOrder {
  public:
   using End = std::uint32_t;
 
-  /// Takes the ends of `boxes` boxes, of which none is in the list. Allocates.
+  /// Takes the ends of `boxes` boxes; the list is empty afterwards. Allocates.
   void assign(std::uint32_t boxes) {
     lines_.assign(std::size_t(2) * boxes, {});
     ranks_.assign(lines_.size(), 0);
@@ -79,8 +79,8 @@ class KineticOrder {
   std::uint32_t rank(End end) const { return ranks_[end]; }
   std::span<const End> list() const { return list_; }
 
-  /// Makes the list anew from the ends of some boxes, sorted at the begin of the segment and right after it.
-  /// O(n log n).
+  /// Makes a new list from the ends of some boxes, sorted at the begin of the segment and right after it. O(n
+  /// log n).
   void sort(std::span<const std::uint32_t> boxes) {
     list_.clear();
     for (const std::uint32_t box : boxes) {
@@ -90,8 +90,8 @@ class KineticOrder {
     std::sort(list_.begin(), list_.end(), [this](End a, End b) { return comes_before(a, b); });
     for (std::uint32_t i = 0; i < list_.size(); ++i) ranks_[list_[i]] = i;
   }
-  /// Sorts the list of the same ends, whose lines changed, by exchanges of neighbours. Returns false if it
-  /// gave up after `most` of them. O(n + exchanges).
+  /// Sorts the list of the same ends, whose lines have changed, by exchanges of neighbours. Returns false if
+  /// it gave up after `most` exchanges. O(n + exchanges).
   template <class OnSwap>
   bool repair(std::uint64_t most, OnSwap&& on_swap) {
     for (std::uint32_t i = 1; i < list_.size(); ++i)
@@ -102,7 +102,7 @@ class KineticOrder {
     return true;
   }
 
-  /// Begins a segment, at whose begin the list is sorted: makes all certificates if it is kept by events. In
+  /// Begins a segment, at whose begin the list is sorted: makes all certificates if events keep the list. In
   /// a segment without a length, or without an end, no end of a box moves. O(n).
   void start_segment(double begin, double end, KeptBy kept) {
     begin_ = begin;
@@ -115,7 +115,7 @@ class KineticOrder {
     for (std::uint32_t i = 0; i + 1 < list_.size(); ++i) certify(i);
   }
   /// Performs all swaps up to and including t, a time of the segment. O(bins passed + certificates in the
-  /// last one + swaps); where the list is kept by sorting, O(n + swaps).
+  /// last one + swaps); if the list is kept by sorting, O(n + swaps).
   template <class OnSwap>
   void advance(double t, OnSwap&& on_swap) {
     if (!moves()) return;
@@ -142,8 +142,8 @@ class KineticOrder {
     for (const std::uint32_t place : early_)
       if (hints_[place] != never && next_[place] == place) link(place);
   }
-  /// Return the numbers of exchanges of neighbours, certificates that fail within their segment, and
-  /// decisions by exact arithmetic, since `assign`.
+  /// Return the numbers since `assign` of exchanges of neighbours, of certificates that fail within their
+  /// segment, and of decisions by exact arithmetic.
   std::uint64_t swaps() const { return swaps_; }
   std::uint64_t certificates() const { return certificates_; }
   std::uint64_t exact_decisions() const { return exact_; }
@@ -157,14 +157,14 @@ class KineticOrder {
 
  private:
   static constexpr double never = std::numeric_limits<double>::infinity();
-  /// Two differences, their sum and the quotient are each off by a relative 2^-53, and so are the three
-  /// operations that make a frame's fraction.
+  /// Two differences, their sum and the quotient each have a relative error of 2^-53, and so do the three
+  /// operations that compute a frame's fraction.
   static constexpr double fraction_error = 0x1p-49;
 
   /// A total order, right after the begin of the segment.
   bool comes_before(End a, End b) const {
     if (const int sign = Rule::at_begin(lines_[a], lines_[b]); sign != 0) return sign < 0;
-    // Closed boxes: what touches all the time overlaps.
+    // Boxes are closed: ends that touch throughout overlap.
     return (a & 1) != (b & 1) ? (a & 1) == 0 : a < b;
   }
   static double magnitude(const MovingEnd<S>& line) {
@@ -241,7 +241,7 @@ class KineticOrder {
     ++swaps_;
     on_swap(low, high);
   }
-  /// The lists of the bins are rings; a place that is in none is a ring of its own.
+  /// The lists of the bins are rings; a place in no bin is a ring of its own.
   void unlink(std::uint32_t place) {
     next_[previous_[place]] = next_[place];
     previous_[next_[place]] = previous_[place];

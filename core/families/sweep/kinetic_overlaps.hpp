@@ -15,15 +15,15 @@ namespace kbvh {
 /// Coming & Staadt 2006).
 ///
 /// Two boxes overlap on an axis if each begins before the other one ends, by their ranks in the list of that
-/// axis. So a swap changes the set by at most one pair, and whether it does is decided by ranks alone. The
-/// set is that of the three lists at any time; the lists may be advanced one after the other. Of two ends
-/// that touch, the order is that right after the touch; where a touch counts, the caller widens boxes.
+/// axis. So a swap changes the set by at most one pair, and ranks alone decide whether it does. The set
+/// matches the three lists at any time; the lists may be advanced one after the other. Ends that touch have
+/// the order that holds right after the touch; if a touch must count, the caller widens boxes.
 template <class S, class Rule = EndOrder>
 class KineticOverlaps {
  public:
   using Order = KineticOrder<S, Rule>;
 
-  /// Takes boxes of bodies, `body_of[box]` ascending, and the pairs of bodies that count. Allocates.
+  /// Takes boxes of bodies, `body_of[box]` ascending, and the pairs of bodies to report. Allocates.
   void assign(std::vector<std::uint32_t> body_of, std::uint32_t bodies, std::span<const BodyPair> pairs) {
     body_of_ = std::move(body_of);
     for (Order& order : orders_) order.assign(std::uint32_t(body_of_.size()));
@@ -48,10 +48,10 @@ class KineticOverlaps {
   std::uint32_t body_pair(BoxPairSet::Pair boxes) const {
     return find_pair(body_of_[boxes.a], body_of_[boxes.b]);
   }
-  /// Returns the list of an axis; its lines are to be set before `start` and `renew`.
+  /// Returns the list of an axis; set its lines before `start` and `renew`.
   Order& order(std::size_t axis) { return orders_[axis]; }
   const Order& order(std::size_t axis) const { return orders_[axis]; }
-  /// Returns the overlapping pairs, a < b, of those pairs of bodies that count.
+  /// Returns the overlapping pairs, a < b, of the pairs of bodies to report.
   const BoxPairSet& set() const { return set_; }
 
   /// Starts over with some boxes, at the begin of a segment: sorts, and sweeps over the axis on which the
@@ -61,8 +61,8 @@ class KineticOverlaps {
     for (Order& order : orders_) order.sort(boxes);
     return sweep(best_axis());
   }
-  /// Continues with the same boxes in a new segment. Returns false, and is to be started over, if the order
-  /// has changed too much.
+  /// Continues with the same boxes in a new segment. Returns false if the order has changed too much; then
+  /// call `start`.
   bool renew() {
     for (std::size_t axis = 0; axis < 3; ++axis)
       if (!orders_[axis].repair(16 * std::uint64_t(orders_[axis].list().size()), swapped(axis))) return false;
@@ -76,7 +76,7 @@ class KineticOverlaps {
     for (std::size_t axis = 0; axis < 3; ++axis) orders_[axis].advance(t, swapped(axis));
   }
 
-  /// Follows one exchange of neighbours on an axis, of which the lists tell already.
+  /// Processes one exchange of neighbours on an axis, which the lists contain already.
   void take_swap(std::size_t axis, std::uint32_t low, std::uint32_t high) {
     if (((low ^ high) & 1) == 0) return;
     const std::uint32_t a = low >> 1, b = high >> 1;
@@ -91,8 +91,8 @@ class KineticOverlaps {
     }
   }
 
-  /// Counts since `assign`: swaps of ends of which one is lower and one upper, of two boxes that count; pairs
-  /// that began to overlap, and that ceased.
+  /// Counts since `assign`: swaps of a lower with an upper end, of two boxes whose bodies are to be reported;
+  /// pairs that began to overlap, and pairs that ceased.
   std::uint64_t exchanges() const { return exchanges_; }
   std::uint64_t meetings() const { return meetings_; }
   std::uint64_t separations() const { return separations_; }
@@ -123,7 +123,7 @@ class KineticOverlaps {
     const Order& order = orders_[axis];
     return order.rank(2 * a) < order.rank(2 * b + 1) && order.rank(2 * b) < order.rank(2 * a + 1);
   }
-  /// Sums, for each box, the ends between its own ends.
+  /// For each box, sums the number of ends between its own ends.
   std::size_t best_axis() const {
     std::size_t best = 0;
     std::uint64_t least = std::numeric_limits<std::uint64_t>::max();

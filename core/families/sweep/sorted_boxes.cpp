@@ -67,7 +67,7 @@ template <class S>
 void SortedBoxes<S>::sort() {
   if (keys_.empty() || insertion_sort(4 * keys_.size())) return;
   radix_sort();
-  // Repairs what the codes do not tell apart.
+  // Sorts what the codes cannot distinguish.
   if (insertion_sort(16 * keys_.size())) return;
   std::sort(keys_.begin(), keys_.end(), [](const Key& a, const Key& b) {
     return a.lower != b.lower ? a.lower < b.lower : a.primitive < b.primitive;

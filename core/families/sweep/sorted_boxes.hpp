@@ -10,14 +10,14 @@
 namespace kbvh {
 
 /// The boxes of one body's primitives in ascending order of their lower sides on one axis. The order is kept
-/// from frame to frame, so that little is left to sort where little moves.
+/// from frame to frame, so that where little moves little has to be sorted.
 template <class S>
 class SortedBoxes {
  public:
   /// Starts over with the primitives of a body in the order of their ids.
   void start(const PrimitiveList& list, KernelSet kernels);
-  /// Sorts by new boxes, [primitive][8]: lower x, y, z, unused, upper x, y, z, unused. O(primitives) where
-  /// the order changes little, else O(n log n).
+  /// Sorts by new boxes, [primitive][8]: lower x, y, z, unused, upper x, y, z, unused. O(primitives) if the
+  /// order changes little, else O(n log n).
   void update(const S* boxes, std::uint32_t axis);
 
   bool empty() const { return primitives_.empty(); }
@@ -32,7 +32,7 @@ class SortedBoxes {
     std::uint32_t primitive;
   };
   void sort();
-  /// Returns false if it gave up after that many steps.
+  /// Returns false if it gave up after this many steps.
   bool insertion_sort(std::size_t most_steps);
   /// Sorts by the lower sides rounded to 30 bits of their range.
   void radix_sort();

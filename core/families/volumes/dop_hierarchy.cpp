@@ -11,7 +11,7 @@ struct DopSlabs {
   static constexpr std::size_t slabs = padded_sides(K) / 2;
   std::array<S, 3 * slabs> directions{};
   std::array<S, slabs>
-      margins{};  ///< over the largest coordinate: 2^-23 (float) or 2^-52 times twice the terms
+      margins{};  ///< relative to the largest coordinate: 2^-23 (float) or 2^-52 times twice the terms
 
   constexpr DopSlabs() {
     for (std::size_t slab = 0; slab < Dop<S, K>::slabs; ++slab) {

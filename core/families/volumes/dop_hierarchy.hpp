@@ -10,11 +10,11 @@
 
 namespace kbvh {
 
-/// The k-DOPs of one body's hierarchy, in which the sides of a node lie next to each other: a refit and a
-/// comparison handle several sides at once. Works with any topology.
+/// The k-DOPs of one body's hierarchy. The sides of a node lie next to each other, so a refit and a
+/// comparison process several sides at once. Works with any topology.
 ///
 /// Rounding: n . p is summed in S, and the sides of leaves are moved outwards by a margin that covers all
-/// roundings, its own among them: by 4 or 6 units of rounding (2^-23 in float, 2^-52 in double) of the body's
+/// roundings, including its own: 4 or 6 units of rounding (2^-23 in float, 2^-52 in double) of the body's
 /// largest coordinate for directions of 2 or 3 terms. Sides along the axes are exact. The bounds are
 /// therefore conservative, and looser than `Dop`'s by that margin.
 template <class S, int K>
@@ -48,7 +48,7 @@ class DopHierarchy {
 
   /// Calls on_leaves(leaf a, leaf b) for each two leaves whose k-DOPs, and those of all nodes above them,
   /// overlap; within one body, for each two leaves once and for each leaf with itself. Counts the tests.
-  /// Returns the pairs of nodes that the budget left undone.
+  /// Returns the number of pairs of nodes that the budget left undone.
   template <class OnLeaves>
   static std::size_t search(const DopHierarchy& a, const DopHierarchy& b, Scratch& scratch,
                             std::uint64_t& tests, const Budget& budget, OnLeaves&& on_leaves) {
@@ -74,7 +74,7 @@ class DopHierarchy {
         job.stack_room = scratch.stack.size();
       }
       a.kernels_->search(K)(job);
-      tests = job.tests;  // `on_leaves` adds its own
+      tests = job.tests;  // `on_leaves` adds its own tests
       for (std::size_t i = 0; i < job.found_count; ++i) on_leaves(job.found[i].a, job.found[i].b);
       job.found_count = 0;
       job.tests = tests;

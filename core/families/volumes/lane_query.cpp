@@ -15,7 +15,7 @@ LaneSearch<S>::LaneSearch(const LaneSide<S>& a, const LaneSide<S>& b, KernelSet 
   if (a.tree->padded_leaf_size() != b.tree->padded_leaf_size())
     throw std::invalid_argument("topologies of all bodies need one leaf size");
   scratch.leaves.resize(2 * leaf_pair_room);
-  scratch.own.clear();  // of a search that was abandoned
+  scratch.own.clear();  // left by an abandoned search
   scratch.found.resize(found_at_once);
   state_ = {scratch.stack.data(),
             0,

@@ -36,7 +36,7 @@ class LaneSearch {
              const Budget& budget, std::uint64_t tests_before);
 
   /// Calls step(state) until nothing is left or the budget is spent; appends the pairs. `roots_overlap` is
-  /// the result of the first test. Returns the pairs of nodes left undone.
+  /// the result of the first test. Returns the number of pairs of nodes left undone.
   template <class Step>
   std::size_t run(bool roots_overlap, Step&& step, PairBuffer& out) {
     if (roots_overlap) state_.stack[state_.depth++] = {0, 0};
@@ -48,7 +48,7 @@ class LaneSearch {
     take_own_leaves(out);
     return state_.depth;
   }
-  /// Returns the tests of nodes and of primitives' boxes, with those before.
+  /// Returns the tests of nodes and of primitives' boxes, including earlier ones.
   std::uint64_t tests() const { return state_.tests; }
 
  private:

@@ -70,7 +70,7 @@ void LaneTree<S>::place_nodes() {
   for (std::uint32_t i = 0; i < topology_.size(); ++i)
     if (!topology_.nodes[i].is_leaf()) wide_[i] = inner++;
   if (inner > (WidePair::leaf_bit >> 3)) throw std::length_error("a hierarchy of more than 2^28 nodes");
-  if (inner == 0) {  // a root that is a leaf still needs a wide node to lie in
+  if (inner == 0) {  // a root that is a leaf still needs a wide node to hold it
     WideNode node;
     node.leaf_count = node.count = 1;
     nodes_.push_back(node);

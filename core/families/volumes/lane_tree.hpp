@@ -9,11 +9,11 @@
 namespace kbvh {
 
 /// One body's tree in wide nodes of up to eight children, for volumes whose numbers lie in rows of eight
-/// lanes per node. Holds no volumes: only nodes, the points of leaves in lists (as in wide_layout.hpp, for
+/// lanes per node. Stores no volumes, only nodes, the points of leaves in lists (as in wide_layout.hpp, for
 /// width 8), the points below each node in one row, and the primitives of leaves with their boxes.
 ///
-/// A point is a vertex; where leaves must cover the boxes of primitives (Cover::boxes), it is a corner of
-/// such a box.
+/// A point is a vertex; if leaves must cover the boxes of primitives (Cover::boxes), it is a corner of such a
+/// box.
 template <class S>
 class LaneTree {
  public:
@@ -26,8 +26,8 @@ class LaneTree {
   /// Takes a topology of width 8 over primitives that must outlive this object. Throws std::length_error
   /// beyond 2^28 nodes, 65,535 points in a leaf, or 2^32 entries of lists.
   void assign(Topology topology, const Primitives& primitives, Cover cover);
-  /// Returns the array [point][3] that lists refer to, from positions [vertex][3] readable up to one scalar
-  /// past the end; places corners of boxes, and invalidates the boxes of primitives.
+  /// Returns the array [point][3] to which lists refer, from positions [vertex][3] readable up to one scalar
+  /// past the end. Places corners of boxes, and invalidates the boxes of primitives.
   const S* place(const S* positions);
 
   const Topology& topology() const { return topology_; }
@@ -41,7 +41,7 @@ class LaneTree {
   /// The largest length of a list.
   std::uint32_t longest_list() const { return longest_list_; }
   /// Points, times 3: those of each node lie in one row. A node whose children are all leaves lists each
-  /// point once. The last is repeated up to a multiple of eight.
+  /// point once. The last point is repeated up to a multiple of eight.
   const AlignedArray<std::uint32_t>& points() const { return points_; }
   const std::vector<Range>& ranges() const { return ranges_; }
 
@@ -58,7 +58,7 @@ class LaneTree {
   std::uint32_t padded_leaf_size() const {
     return topology_.leaf_size <= 4 ? 4 : topology_.leaf_size <= 8 ? 8 : 16;
   }
-  /// Returns what a query reads of the leaves; `placed` is the result of `place`.
+  /// Returns the data of the leaves that a query reads; `placed` is the result of `place`.
   WideLeaves<S> leaves(const S* placed) {
     return {{first_entry_.data(), first_entry_.data() + 1, first_corner_.data(), corners_.data(),
              topology_order_.data()},

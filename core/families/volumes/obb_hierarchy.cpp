@@ -26,7 +26,7 @@ void ObbHierarchy<S>::assign(Topology topology, const Primitives& primitives) {
 
 template <class S>
 void ObbHierarchy<S>::choose_frames() {
-  // Lanes without a frame repeat the first point, which any body has.
+  // Lanes without a frame repeat the first point, which every body has.
   std::fill(node_frames_.begin(), node_frames_.end(), tree_.points()[0]);
   for (std::uint32_t n = 0; n < tree_.node_count(); ++n) {
     const auto range = tree_.ranges()[n];

@@ -8,8 +8,8 @@ namespace kbvh {
 
 /// How the frames of oriented boxes move.
 struct ObbFrameRule {
-  bool follow = true;       ///< with three of the points below; otherwise they stay until chosen anew
-  std::uint32_t every = 0;  ///< refits until frames are chosen anew; 0: never
+  bool follow = true;       ///< with three of the points below; otherwise they stay until chosen again
+  std::uint32_t every = 0;  ///< refits until frames are chosen again; 0: never
 };
 
 /// The oriented boxes of one body's hierarchy, refitted and compared eight at a time. Each box contains the
@@ -31,7 +31,7 @@ class ObbHierarchy {
   ObbHierarchy(Topology topology, const Primitives& primitives, Cover cover,
                KernelSet kernels = active_kernel_set());
 
-  /// Sets how frames move from the next refit on; chooses them anew there.
+  /// Sets how frames move from the next refit on, which also chooses new frames.
   void set_rule(ObbFrameRule rule) {
     rule_ = rule;
     due_ = 0;
@@ -41,7 +41,7 @@ class ObbHierarchy {
   void assign(Topology topology, const Primitives& primitives);
   /// Computes all boxes from positions [vertex][3], readable up to one scalar past the end.
   void refit(const S* positions);
-  /// Chooses the frames anew at the next refit.
+  /// Chooses new frames at the next refit.
   void restore() { due_ = 0; }
 
   const Topology& topology() const { return tree_.topology(); }
@@ -52,8 +52,8 @@ class ObbHierarchy {
   std::size_t leaf_vertex_count() const { return tree_.leaf_point_count(); }
   std::size_t bytes() const;
 
-  /// Appends the pairs of primitives of two bodies, or of one, whose boxes overlap and all oriented boxes
-  /// above them. Counts the tests. Returns the pairs of nodes that the budget left undone.
+  /// Appends the pairs of primitives of two bodies, or of one, whose boxes and all oriented boxes above them
+  /// overlap. Counts the tests. Returns the number of pairs of nodes that the budget left undone.
   static std::size_t find_pairs(ObbHierarchy& a, std::uint32_t body_a, ObbHierarchy& b, std::uint32_t body_b,
                                 Scratch& scratch, std::uint64_t& tests, const Budget& budget,
                                 PairBuffer& out);

@@ -82,7 +82,7 @@ std::array<std::uint32_t, 3> choose_triple(std::span<const std::uint32_t> points
     const Vec p = position(extremes.id[k]);
     extremes.at[k] = {p.x / reach, p.y / reach, p.z / reach};
   }
-  // A long edge, the point furthest from its line, and those furthest from the plane.
+  // A long edge, the point furthest from its line, and the points furthest from the plane.
   const auto best_of = [&](const auto& value) {
     std::size_t best = 0;
     for (std::size_t k = 1; k < 2 * directions; ++k)

@@ -5,7 +5,7 @@
 namespace kbvh {
 namespace {
 
-/// Coordinates whose squares neither overflow nor lose more than `least` covers.
+/// The range of coordinates whose squares neither overflow nor lose more than `least` covers.
 template <class S>
 struct SquareRange {
   static constexpr S least = sizeof(S) == 4 ? S(0x1p-70) : S(0x1p-500);

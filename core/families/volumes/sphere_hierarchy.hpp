@@ -6,13 +6,13 @@
 
 namespace kbvh {
 
-/// What the sphere of an inner node must contain.
+/// The contents of an inner node's sphere.
 enum class SphereBounds : std::uint8_t {
   wrapped,  ///< the points below the node
   layered,  ///< the spheres of its children
 };
 
-/// The spheres of one body's hierarchy, refitted and compared eight at a time. Centres are those of the boxes
+/// The spheres of one body's hierarchy, refitted and compared eight at a time. Each has the centre of the box
 /// around the points below.
 ///
 /// Wrapped spheres measure the distance to every point below each node: O(points x depth), but the points of
@@ -20,8 +20,8 @@ enum class SphereBounds : std::uint8_t {
 /// children: O(nodes); their radius is cut at the furthest corner of the box around the points.
 ///
 /// Rounding: distances are computed in S and enlarged by 8 roundings (relative, 2^-24 or 2^-53 each), and by
-/// 2^-70 (float) or 2^-500 (double) for underflow. Bodies whose coordinates are all below 2^-40 (2^-300), or
-/// one of which is above 2^60 (2^400), are fitted by `fit` and `enclose` of Sphere, layered, without SIMD.
+/// 2^-70 (float) or 2^-500 (double) for underflow. Bodies with all coordinates below 2^-40 (2^-300), or with
+/// a coordinate above 2^60 (2^400), are fitted by `fit` and `enclose` of Sphere, layered, without SIMD.
 template <class S, SphereBounds bounds>
 class SphereHierarchy {
  public:
@@ -48,8 +48,8 @@ class SphereHierarchy {
   std::size_t leaf_vertex_count() const { return tree_.leaf_point_count(); }
   std::size_t bytes() const;
 
-  /// Appends the pairs of primitives of two bodies, or of one, whose boxes overlap and all spheres above
-  /// them. Counts the tests. Returns the pairs of nodes that the budget left undone.
+  /// Appends the pairs of primitives of two bodies, or of one, whose boxes and all spheres above them
+  /// overlap. Counts the tests. Returns the number of pairs of nodes that the budget left undone.
   static std::size_t find_pairs(SphereHierarchy& a, std::uint32_t body_a, SphereHierarchy& b,
                                 std::uint32_t body_b, Scratch& scratch, std::uint64_t& tests,
                                 const Budget& budget, PairBuffer& out);
@@ -62,7 +62,7 @@ class SphereHierarchy {
   LaneTree<S> tree_;
   Cover cover_;
   const S* placed_ = nullptr;
-  std::vector<std::uint32_t> list_;  ///< points of a leaf, where kernels are not used
+  std::vector<std::uint32_t> list_;  ///< points of a leaf, if kernels are not used
   AlignedArray<S> rows_, own_, boxes_, coordinates_, scratch_;
 };
 

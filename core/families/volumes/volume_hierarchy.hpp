@@ -18,7 +18,7 @@ namespace kbvh {
 /// The part of each primitive that the volume of a leaf must contain.
 enum class Cover : std::uint8_t {
   vertices,  ///< its vertices, and therefore their convex hull
-  boxes,     ///< its axis-aligned box, for pairs that are answered at candidate level by boxes
+  boxes,     ///< its axis-aligned box, for pairs of which only the boxes are compared
 };
 
 /// The hierarchy of one body that stores a bounding volume of any kind per node. The topology may have any
@@ -98,7 +98,7 @@ class VolumeHierarchy {
 
   /// Calls on_leaves(leaf a, leaf b) for each two leaves whose volumes, and those of all nodes above them,
   /// overlap; within one body, for each two leaves once and for each leaf with itself. Counts the tests.
-  /// Returns the pairs of nodes that the budget left undone.
+  /// Returns the number of pairs of nodes that the budget left undone.
   template <class OnLeaves>
   static std::size_t search(const VolumeHierarchy& a, const VolumeHierarchy& b, Scratch& scratch,
                             std::uint64_t& tests, const Budget& budget, OnLeaves&& on_leaves) {

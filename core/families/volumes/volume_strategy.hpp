@@ -12,8 +12,8 @@
 namespace kbvh {
 
 /// The shared part of strategies over hierarchies of bounding volumes: every volume of a moving body is
-/// recomputed at each frame, leaves first. `Hierarchies` lists the kinds; an instance uses one. Each is one
-/// body's hierarchy, as VolumeHierarchy and DopHierarchy are.
+/// recomputed at each frame, leaves first. `Hierarchies` lists the kinds; an instance uses one. Each kind is
+/// a hierarchy of one body, such as VolumeHierarchy and DopHierarchy.
 template <class S, class... Hierarchies>
 class HierarchyStrategy : public CountedStrategy<S>,
                           public AnswersRays<S>,
@@ -70,7 +70,7 @@ class HierarchyStrategy : public CountedStrategy<S>,
     return status;
   }
 
-  /// The strategy reads only positions; afterwards no body is certain to rest.
+  /// The strategy reads only positions, so this only records that any body may move from now on.
   void follow_plans(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
     plans_changed_ = true;
   }

@@ -18,7 +18,7 @@ void HeightOrder::assign(std::span<const WideNode> nodes) {
   }
   for (std::size_t h = 1; h < begin_.size(); ++h) begin_[h] += begin_[h - 1];
   for (std::uint32_t n = 0; n < nodes.size(); ++n) put(n, begin_[heights_[n]]++);
-  // Each entry has become the end of its height: the begin of the next.
+  // Each entry now holds the end of its height, which is the begin of the next.
   std::rotate(begin_.begin(), begin_.end() - 1, begin_.end());
   begin_[0] = 0;
 }

@@ -10,14 +10,14 @@
 
 namespace kbvh {
 
-/// The number of leaf pairs that queries collect before they turn them into pairs of primitives: few enough
-/// to stay in the cache.
+/// The number of leaf pairs that queries collect before turning them into pairs of primitives: few enough to
+/// stay in the cache.
 inline constexpr std::size_t leaf_pair_room = 2048;
 /// The number of pairs of primitives that kernels find at a time.
 inline constexpr std::size_t found_at_once = 2048;
 
-/// Takes pairs of a leaf with itself out of the list, and appends these leaves to `own`; both in their order.
-/// Returns the number of pairs of two different leaves, which are left.
+/// Moves the leaves that are paired with themselves from the list to `own`, keeping both orders. Returns the
+/// number of remaining pairs, which have two different leaves.
 inline std::size_t take_out_own_leaves(LeafSlot* pairs, std::size_t count, std::vector<LeafSlot>& own) {
   std::size_t different = 0;
   for (std::size_t i = 0; i < count; ++i) {
@@ -33,7 +33,7 @@ inline std::size_t take_out_own_leaves(LeafSlot* pairs, std::size_t count, std::
 }
 
 /// Calls take(count) for the pairs of each of the `own` leaves with itself, written to `pairs` at most `room`
-/// at a time, and forgets the leaves. Queries call this at their end: the order of their answers then does
+/// at a time, and forgets the leaves. Queries call this at their end, so that the order of their answers does
 /// not depend on how many pairs of leaves are taken at a time.
 template <class Take>
 void for_own_leaves(std::vector<LeafSlot>& own, LeafSlot* pairs, std::size_t room, const Take& take) {

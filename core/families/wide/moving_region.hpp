@@ -8,8 +8,8 @@
 
 namespace kbvh {
 
-/// The nodes of one hierarchy below which vertices move, and their refit alone. The hierarchy must not be
-/// edited.
+/// The nodes of one hierarchy below which vertices move, and a refit of these nodes alone. The hierarchy must
+/// not be edited.
 template <class S>
 class MovingRegion {
  public:
@@ -22,8 +22,8 @@ class MovingRegion {
     list_nodes_of_vertices(hierarchy);
   }
 
-  /// Marks the nodes above all vertices that differ between two arrays [vertex][3]; all nodes if most
-  /// vertices differ, since then finding the others does not pay. O(vertices + nodes).
+  /// Marks the nodes above all vertices that differ between two arrays [vertex][3]; marks all nodes if most
+  /// vertices differ, because finding the others would not pay. O(vertices + nodes).
   void mark(WideHierarchy<S>& hierarchy, const S* first, const S* last, Marks& marks) const {
     constexpr std::uint32_t block = 16;  // vertices that are compared at once
     marks.assign(hierarchy.node_count(), 0);
@@ -69,7 +69,7 @@ class MovingRegion {
   void refit(WideHierarchy<S>& hierarchy, const S* positions) const {
     for (const Run& run : runs_) hierarchy.refit_nodes(positions, run.begin, run.end);
   }
-  /// Return the boxes that a refit writes, and the vertices that it reads, each once per leaf.
+  /// Return the number of boxes that a refit writes, and of the vertices that it reads, each once per leaf.
   std::uint64_t boxes() const { return boxes_; }
   std::uint64_t reads() const { return reads_; }
 
@@ -82,11 +82,11 @@ class MovingRegion {
     std::uint32_t begin, end;  ///< wide nodes
   };
 
-  /// Lists, for each vertex, the wide nodes whose leaves have it, by counting.
+  /// Lists, for each vertex, the wide nodes with leaves that contain it, by counting.
   void list_nodes_of_vertices(WideHierarchy<S>& hierarchy) {
     constexpr std::uint32_t none = ~std::uint32_t(0);
     const WideArrays<S> arrays = hierarchy.arrays();
-    std::vector<std::uint32_t> last(vertices_, none);  // node that was listed last
+    std::vector<std::uint32_t> last(vertices_, none);  // node listed last
     const auto for_entries = [&](const auto& work) {
       std::fill(last.begin(), last.end(), none);
       for (std::uint32_t node = 0; node < hierarchy.node_count(); ++node) {

@@ -8,7 +8,7 @@
 namespace kbvh {
 
 namespace {
-/// Below this number a loop over all pairs, which compares roots, costs less than a search.
+/// Below this number of pairs, comparing all roots in a loop costs less than a search.
 constexpr std::size_t few_pairs = 256;
 constexpr std::uint32_t pairs_per_body = 4;
 /// The tree is rebuilt when a search makes this many times the tests of the first search after the last
@@ -57,7 +57,7 @@ NearBodies::NearBodies(std::span<const BodyPair> pairs, std::uint32_t body_count
 
 NearBodies::~NearBodies() = default;
 
-/// An empty box becomes a point of the preceding body: pairs with such a body never count.
+/// An empty box becomes a point of the preceding body: pairs with an empty body never count.
 void NearBodies::put(std::uint32_t body, const Box<double>& box) {
   double* const corners = corners_.data() + std::size_t(6) * body;
   empty_[body] = box.empty() ? 1 : 0;
@@ -100,7 +100,7 @@ void NearBodies::search(std::uint64_t& tests) {
   if (!order_.empty()) std::sort(near_.begin(), near_.end());
 }
 
-/// Appends every pair of the scene between two bodies, the first of which has the smaller number.
+/// Appends every pair of the scene that consists of two given bodies; the first has the smaller number.
 void NearBodies::append_pairs(std::uint32_t first, std::uint32_t second) {
   const auto index = [&](std::uint32_t place) { return order_.empty() ? place : order_[place]; };
   std::uint32_t low = begin_[first], high = begin_[first + 1];

@@ -16,8 +16,8 @@ inline Budget rest_of(const Budget& budget, std::uint64_t tests) {
 /// The broad phase over bodies: selects the pairs of bodies that a query must visit. Scenes with few pairs
 /// are not searched: all their pairs count as near. Scenes with many small bodies have a tree over the
 /// bodies' boxes, refitted at each search and rebuilt when the bodies have mixed; a search joins the tree
-/// with itself. Time and memory are proportional to bodies and near pairs; a scene whose list of pairs is not
-/// sorted needs 4 more bytes per pair.
+/// with itself. Time and memory are proportional to bodies and near pairs; if a scene's list of pairs is not
+/// sorted, it needs 4 more bytes per pair.
 ///
 /// Boxes are closed and compared exactly. The result does not depend on earlier searches.
 class NearBodies {
@@ -45,7 +45,7 @@ class NearBodies {
   /// Returns the result of the last `find`.
   std::span<const std::uint32_t> last() const { return near_; }
 
-  /// Rebuilds the tree at the next search, so that a restarted clip costs the same as before.
+  /// Rebuilds the tree at the next search, so that a restarted clip costs the same as the first run.
   void start_over() { build_due_ = true; }
 
   std::size_t bytes() const;

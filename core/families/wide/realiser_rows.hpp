@@ -9,10 +9,10 @@
 
 namespace kbvh {
 
-/// Boxes on demand that are known by the vertices that realise their sides: each side is one coordinate of
+/// Boxes on demand that are given by the vertices that realise their sides: each side is one coordinate of
 /// one vertex. The callable `places_of(node, room)` returns the realisers of a wide node's rows, [6][width],
-/// each as 3 * vertex + axis, any valid place for empty lanes; `room` has lane_scalars(width) entries that it
-/// may use for them.
+/// each as 3 * vertex + axis, any valid place for empty lanes; it may use the lane_scalars(width) entries of
+/// `room` for them.
 template <class S>
 class RealiserRows : public RowsOnDemand<S> {
  public:

@@ -29,14 +29,15 @@ class RowsOnDemand {
   const WideHierarchy<S>& hierarchy() const { return hierarchy_; }
   /// Returns, by wide node, a value that is not 0 while the boxes of the node's children are out of date.
   const std::uint8_t* stale() const { return stale_.data(); }
-  /// Returns whether the box of a node of the topology is current: its wide parent's rows are, or those of
-  /// the root.
+  /// Returns whether the box of a node of the topology is current: it is if the rows of its wide parent are,
+  /// or those of the root for the root.
   bool current(std::uint32_t node) const {
     const std::uint32_t parent = hierarchy_.wide_parent(node);
     return stale_[parent == WideHierarchy<S>::no_node ? 0 : parent] == 0;
   }
 
-  /// Discards all boxes and the visits learnt from queries, so that a replayed clip costs the same again.
+  /// Discards all boxes and the visits learnt from queries, so that a replayed clip costs the same as the
+  /// first run.
   void start_over() {
     std::fill(stale_.begin(), stale_.end(), std::uint8_t(1));
     visited_.clear();
@@ -53,7 +54,7 @@ class RowsOnDemand {
     ++frames_;
     if (line_ends_[0] == nullptr || t >= line_times_[1]) find_lines(motion, body);
   }
-  /// Ends the body's rest and its present segment, after a change of its vertices' plans.
+  /// Ends the body's rest and its current segment, after a change of its vertices' plans.
   void plans_changed() {
     rests_until_ = -std::numeric_limits<double>::infinity();
     line_ends_[0] = nullptr;
@@ -67,7 +68,7 @@ class RowsOnDemand {
  protected:
   static constexpr std::size_t made_together = 16;  ///< nodes per batch
 
-  /// Returns the nodes to compute before a query: those that recent queries visited, at least the root.
+  /// Returns the nodes to compute before a query: those that recent queries visited, or at least the root.
   /// Returns nothing if they are current.
   std::span<const std::uint32_t> due() {
     if (hierarchy_.empty()) return {};
@@ -79,7 +80,7 @@ class RowsOnDemand {
     if (visited_.empty()) visited_.push_back(0);
     return visited_;
   }
-  /// Records the visit of a node that a query waits for. Returns the node.
+  /// Records the visit to a node that a query waits for. Returns the node.
   std::span<const std::uint32_t> visit(std::uint32_t node) {
     visited_.push_back(node);
     return {&visited_.back(), 1};
@@ -97,7 +98,7 @@ class RowsOnDemand {
   }
 
  private:
-  static constexpr std::uint32_t visits_kept = 16;  ///< frames after which visits are learnt anew
+  static constexpr std::uint32_t visits_kept = 16;  ///< frames after which visits are learnt again
 
   void find_lines(const SegmentMotion<S>& motion, std::uint32_t body) {
     line_ends_[0] = nullptr;

@@ -14,18 +14,18 @@ namespace kbvh {
 /// threads may ask for the same leaf: all but one are refused, and the rows may be read after the next
 /// Workers::for_each.
 inline bool claim_leaf(std::uint32_t& stamp, std::uint32_t current) {
-  // Builtins: std::atomic_ref is missing from some standard libraries. Most leaves are claimed already.
+  // Uses builtins: std::atomic_ref is missing from some standard libraries. Most leaves are claimed already.
   if (__atomic_load_n(&stamp, __ATOMIC_RELAXED) == current) return false;
   return __atomic_exchange_n(&stamp, current, __ATOMIC_RELAXED) != current;
 }
 
 /// The work of simultaneous traversals, cut into items that threads share. One traversal works from the top
-/// of its stack to the bottom, so each pair on the stack is an item, and the answers of the items, one after
-/// another, are the answer of the traversal in its order. The front expands the topmost pairs, level by
-/// level, until there are enough items; what leaves it finds on the way becomes an item at its place.
+/// of its stack to the bottom. Each pair on the stack is therefore an item, and the answers of the items, one
+/// after another, are the answer of the traversal in its order. The front expands the topmost pairs, level by
+/// level, until there are enough items; pairs of leaves found on the way become items at their places.
 ///
-/// Threads then traverse the items, and keep the pairs of leaves that they find in memory of their own. The
-/// found pairs are cut anew, into batches of nearly equal size.
+/// Threads then traverse the items, and keep the pairs of leaves that they find in their own memory. The
+/// pairs found are then cut again, into batches of nearly equal size.
 ///
 /// Calls for each of several traversals (pairs of bodies), numbered from 0:
 ///   step(traversal, state)   continues the traversal of the pairs on the stack of `state`
@@ -40,17 +40,17 @@ class SharedFront {
   /// Pairs of leaves per batch: some tens of microseconds of work; and their leaves.
   static constexpr std::size_t batch_pairs = 256, most_batch_slots = 2 * batch_pairs;
 
-  /// Starts anew, without traversals.
+  /// Starts over, without traversals.
   void start() {
     items_.clear();
     found_.clear();
     expansion_tests_ = 0;
   }
-  /// Adds a traversal that starts at the roots, after those added before.
+  /// Adds a traversal that starts at the roots; it follows those already added.
   void add(std::uint32_t traversal) { items_.push_back({{0, 0}, traversal, Item::pair, 0, 0}); }
 
-  /// Expands the front, and traverses it. `take(batch, runner)` is called with pairs of leaves as they are
-  /// found, in any order. Returns the box tests made.
+  /// Expands the front, and traverses it. Calls `take(batch, runner)` with pairs of leaves as they are found,
+  /// in any order. Returns the box tests made.
   template <class Step, class Take>
   std::uint64_t traverse(Workers& workers, const Step& step, const Take& take) {
     runners_.resize(workers.threads());
@@ -74,7 +74,7 @@ class SharedFront {
       all += runner.found.size();
       deepest = std::max(deepest, runner.stack.size());
     }
-    // Another frame may give all work to one thread: nothing is allocated then.
+    // Another frame may give all work to one thread; no memory is then allocated.
     for (Runner& runner : runners_) {
       runner.found.reserve(all);
       runner.stack.resize(deepest);
@@ -102,10 +102,10 @@ class SharedFront {
   }
 
  private:
-  /// Items more than threads, so that none of them is long compared with a thread's share.
+  /// Items per thread: enough that no item is long compared with a thread's share.
   static constexpr std::size_t items_per_thread = 24;
   static constexpr std::uint32_t most_levels = 12;
-  /// As many as `leaf_pair_room`: they stay in the cache.
+  /// The same as `leaf_pair_room`: the pairs stay in the cache.
   static constexpr std::size_t leaf_pairs_at_once = 2048;
 
   /// A pair to be traversed, or, afterwards, pairs of leaves found by a runner: [begin, end) of its list.

@@ -48,7 +48,7 @@ void SharedQuery<S>::run(Workers& workers, PairBuffer& out, std::uint64_t& tests
     all += room.found.size();
     all_own += room.found_own.size();
   }
-  // Another frame may give all work to one thread: nothing is allocated then.
+  // Another frame may give all work to one thread; no memory is then allocated.
   for (Runner& room : runners_) {
     room.found.reserve(all);
     room.found_own.reserve(all_own);
@@ -60,7 +60,8 @@ void SharedQuery<S>::run(Workers& workers, PairBuffer& out, std::uint64_t& tests
   copy_found(workers, out);
 }
 
-/// Appends what the batches found, in their order; of a body with itself the pairs of two leaves come first.
+/// Appends the pairs that the batches found, in order; for a body with itself, pairs of two leaves come
+/// first.
 template <class S>
 void SharedQuery<S>::copy_found(Workers& workers, PairBuffer& out) {
   const auto batches = front_.batches();

@@ -12,8 +12,8 @@ namespace kbvh {
 /// The query of WideQuery on several threads, for stored boxes and current positions: the same pairs in the
 /// same order, and the same number of tests, for any number of threads.
 ///
-/// Threads traverse the items of a SharedFront, and compute the boxes of primitives in the leaves that they
-/// are the first to reach. Then they compare primitives, a batch of leaf pairs at a time.
+/// Threads traverse the items of a SharedFront, and compute the boxes of primitives in leaves that they are
+/// the first to reach. Then they compare primitives, a batch of leaf pairs at a time.
 template <class S>
 class SharedQuery {
  public:
@@ -22,7 +22,7 @@ class SharedQuery {
   /// Makes queries of the bodies of a scene, at the time of the motion.
   SharedQuery(const SceneView<S>& scene, const SampledMotion<S>& motion) : scene_(scene), motion_(motion) {}
 
-  /// Starts anew, without bodies.
+  /// Starts over, without bodies.
   void start() { pairs_.clear(); }
   /// Adds a pair of bodies, or a body with itself, as in WideQuery::run. Fetches all their positions.
   void add(const Side& a, const Side& b) {
@@ -33,7 +33,8 @@ class SharedQuery {
   /// Appends the pairs of primitives of all added bodies; adds the box tests made to `tests`.
   void run(Workers& workers, PairBuffer& out, std::uint64_t& tests);
 
-  /// Returns the box tests of inner nodes that one thread made at most in the last query: its balance.
+  /// Returns the largest number of box tests of inner nodes that one thread made in the last query, which
+  /// shows how balanced it was.
   std::uint64_t most_tests() const { return front_.most_tests(); }
   std::size_t bytes() const;
 
@@ -50,12 +51,12 @@ class SharedQuery {
     PairBuffer found, found_own;  ///< of two leaves, or of two bodies, and of one leaf
     std::uint64_t tests = 0;
   };
-  /// Where the pairs of a batch are, [begin, end) of a runner's lists, and where they go in the answer.
+  /// The pairs of a batch, [begin, end) of a runner's lists, and their place in the answer.
   struct Result {
     std::uint32_t runner;
     std::size_t begin, end, begin_own, end_own, to, to_own;
   };
-  /// The batches whose pairs one thread copies at once.
+  /// Number of batches whose pairs one thread copies at once.
   static constexpr std::size_t copied_at_once = 8;
   void claim_leaves(const Batch& batch, Runner& room);
   void compare(std::size_t batch, std::uint32_t runner);

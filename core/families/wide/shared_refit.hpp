@@ -11,18 +11,18 @@
 namespace kbvh {
 
 /// The refits of several bodies on several threads: large bodies by subtrees, small ones several at a time.
-/// The nodes above the subtrees are refitted by one thread afterwards. Every box is written once, by one
-/// thread; different threads write to one cache line at most where their ranges of nodes meet.
+/// Afterwards one thread refits the nodes above the subtrees. Every box is written once, by one thread;
+/// different threads write to the same cache line only where their ranges of nodes meet.
 template <class S>
 class SharedRefit {
  public:
-  /// Starts anew, without bodies.
+  /// Starts over, without bodies.
   void start() {
     refits_.clear();
     items_.clear();
     gathered_ = none_gathered;
   }
-  /// Adds the refit of a body, into its own boxes or, as WideHierarchy::refit_into, into others.
+  /// Adds the refit of a body, into its own boxes or, like WideHierarchy::refit_into, into others.
   void add(WideHierarchy<S>& hierarchy, const S* positions) {
     const WideArrays<S> arrays = hierarchy.arrays();
     add(hierarchy, positions, arrays.child_bounds, arrays.node_bounds);
@@ -45,13 +45,13 @@ class SharedRefit {
   }
   void run(Workers& workers) {
     for_each_range(workers, [](const Refit& refit, std::uint32_t begin, std::uint32_t end) {
-      if (begin == 0 && end == refit.hierarchy->node_count())  // edited ones have an order of their own
+      if (begin == 0 && end == refit.hierarchy->node_count())  // edited hierarchies have their own order
         refit.hierarchy->refit_into(refit.child_bounds, refit.node_bounds, refit.positions);
       else
         refit.hierarchy->refit_into(refit.child_bounds, refit.node_bounds, refit.positions, begin, end);
     });
   }
-  /// Makes all boxes empty, without positions: those of a node in the memory of the thread that will refit
+  /// Makes all boxes empty, without positions: each node's boxes in the memory of the thread that will refit
   /// it.
   void make_empty(Workers& workers) {
     for_each_range(workers, [](const Refit& refit, std::uint32_t begin, std::uint32_t end) {
@@ -61,8 +61,8 @@ class SharedRefit {
       std::fill(refit.node_bounds + std::size_t(8) * begin, refit.node_bounds + std::size_t(8) * end, S(0));
     });
   }
-  /// Moves the boxes and vertex lists of hierarchies, those of the added refits in their order, to the memory
-  /// of the threads that will refit them.
+  /// Moves the boxes and vertex lists of hierarchies, in the order of the added refits, to the memory of the
+  /// threads that will refit them.
   void place(Workers& workers, std::span<WideHierarchy<S>> hierarchies) {
     std::vector<typename WideHierarchy<S>::Placed> places;
     for (const WideHierarchy<S>& hierarchy : hierarchies) places.push_back(hierarchy.new_place());
@@ -74,7 +74,7 @@ class SharedRefit {
   std::size_t bytes() const { return refits_.capacity() * sizeof(Refit) + items_.capacity() * sizeof(Item); }
 
  private:
-  /// Calls work(refit, begin, end) for ranges of nodes that together are all: children before their parents.
+  /// Calls work(refit, begin, end) for ranges that together cover all nodes, children before their parents.
   template <class Work>
   void for_each_range(Workers& workers, const Work& work) {
     workers.for_each(items_.size(), [&](std::size_t i, std::uint32_t) {

@@ -2,8 +2,8 @@
 #include <optional>
 #include <utility>
 
+#include "core/contract/reports_work.hpp"
 #include "core/contract/strategy.hpp"
-#include "core/contract/tells_work.hpp"
 #include "core/families/wide/near_bodies.hpp"
 #include "core/families/wide/surface_sums.hpp"
 #include "core/families/wide/swept_hierarchies.hpp"
@@ -24,7 +24,7 @@ inline Box<S> leaf_box(std::span<const std::uint32_t> vertices, const S* positio
 /// `update(body)`. Bodies that cannot move are updated at `reset` only. Most strategies derive from
 /// StoredHierarchyStrategy, which also accepts changes of plans.
 template <class S>
-class FixedPlansHierarchyStrategy : public CountedStrategy<S>, public AnswersRays<S>, public TellsWork {
+class FixedPlansHierarchyStrategy : public CountedStrategy<S>, public AnswersRays<S>, public ReportsWork {
  public:
   FixedPlansHierarchyStrategy(const SceneView<S>& scene, const SampledMotion<S>& motion,
                               Topologies topologies, const Params& /*params*/,
@@ -120,16 +120,16 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S>, public AnswersRay
     this->count_.add(Counter::box_tests, tests);
     last_ray_tests_ = tests;
   }
-  /// Returns what the rays of the last call did with each body.
+  /// Returns the work of the last call's rays in each body.
   std::span<const RayWork> ray_work() const { return rays_.work(); }
-  /// Returns what rays read of a body; lazy strategies add the marks of stale nodes, for which `make_row` is
-  /// called then.
+  /// Returns the data of a body that rays read. Lazy strategies add the marks of stale nodes; `make_row` is
+  /// then called for these.
   virtual WideSide<S> ray_side(std::uint32_t body) { return side(body); }
   virtual void make_row(std::uint32_t /*body*/, std::uint32_t /*node*/) {}
   /// Called when the topology of a body's hierarchy has changed, to update dependent data.
   virtual void topology_changed(std::uint32_t /*body*/) {}
-  /// Implements the broad phase of contacts by one refit to both ends of the motion, on the topologies at its
-  /// first call: for strategies that declare contacts, in `swept_pairs`.
+  /// Implements the broad phase of contacts by one refit to both ends of the motion, on the topologies of its
+  /// first call: for `swept_pairs` of strategies that declare contacts.
   void sweep(std::span<const S* const> before, PairBuffer& out) {
     if (!swept_)
       swept_.emplace(
@@ -194,20 +194,20 @@ FixedPlansHierarchyStrategy<S>::FixedPlansHierarchyStrategy(const SceneView<S>& 
 template <class S>
 FixedPlansHierarchyStrategy<S>::~FixedPlansHierarchyStrategy() = default;
 
-/// The same for plans that change, too.
+/// Does the same for plans that may change.
 template <class S>
 class StoredHierarchyStrategy : public FixedPlansHierarchyStrategy<S>, public TakesPlanChanges<S> {
  public:
   using FixedPlansHierarchyStrategy<S>::FixedPlansHierarchyStrategy;
 
  protected:
-  /// The strategy reads only positions; it only records that no body is certain to rest.
+  /// The strategy reads only positions, so this only records that any body may move from now on.
   void follow_plans(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
     this->plans_changed_ = true;
   }
 };
 
-// Compiled once, in stored_hierarchy.cpp, and not with every strategy.
+// Compiled once, in stored_hierarchy.cpp, instead of with every strategy.
 extern template class StoredHierarchyStrategy<float>;
 extern template class StoredHierarchyStrategy<double>;
 extern template class FixedPlansHierarchyStrategy<float>;

@@ -30,9 +30,9 @@ inline double own_surface(const WideArrays<S>& arrays, std::uint32_t node) {
   return side[0] * side[1] + side[1] * side[2] + side[2] * side[0];
 }
 
-/// Returns the quality of a refitted hierarchy that is not edited: the surfaces of all boxes below the root
-/// over that of the root, the part of the surface-area heuristic that depends on the boxes. 0 for a root
-/// without surface. O(nodes).
+/// Returns the quality of a refitted, unedited hierarchy: the summed surface of all boxes below the root,
+/// divided by that of the root. This is the part of the surface-area heuristic that depends on the boxes. 0
+/// for a root without surface. O(nodes).
 template <class S>
 double surface_ratio(WideHierarchy<S>& hierarchy) {
   if (hierarchy.empty()) return 0;

@@ -8,8 +8,8 @@
 namespace kbvh {
 
 /// Boxes that contain everything at both ends of a motion and therefore, if the motion is linear, throughout:
-/// hierarchies over primitives with every vertex twice, at its old and its new position, refitted bottom-up.
-/// Boxes are not rounded.
+/// hierarchies over primitives that contain every vertex twice, at its old and its new position, refitted
+/// bottom-up. Boxes are not rounded.
 template <class S>
 class SweptHierarchies {
  public:
@@ -26,7 +26,7 @@ class SweptHierarchies {
   /// Refits to a motion from `before` (positions of each body) to the current positions of the motion view.
   void refit(std::span<const S* const> before, const SampledMotion<S>& motion);
 
-  /// Appends the pairs of primitives whose boxes overlap; within a body also those that share a vertex.
+  /// Appends the pairs of primitives whose boxes overlap; within a body, including those that share a vertex.
   void pairs(WideQuery<S>& query, PairBuffer& out, std::uint64_t& tests);
 
   std::size_t bytes() const;

@@ -8,9 +8,9 @@
 
 namespace kbvh {
 
-/// Returns a wide tree that has no topology as one, and the box of each node: for audits. `nodes`,
-/// `child_bounds` and `node_bounds` are as in WideArrays, node 0 being the root; primitives_of(leaf) returns
-/// the primitives of a leaf. O(nodes).
+/// Converts a wide tree without a topology to a topology, and returns the box of each node: for audits.
+/// `nodes`, `child_bounds` and `node_bounds` are as in WideArrays, node 0 being the root; primitives_of(leaf)
+/// returns the primitives of a leaf. O(nodes).
 template <class S, class PrimitivesOf>
 Topology topology_of(std::span<const WideNode> nodes, const S* child_bounds, const S* node_bounds,
                      std::uint32_t width, std::uint32_t leaf_size, const PrimitivesOf& primitives_of,

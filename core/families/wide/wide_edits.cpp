@@ -1,6 +1,6 @@
-// The layout of a wide hierarchy follows edits of its topology. The layout needs the leaves below a wide node
-// side by side, and its other children, too; the rest may lie anywhere. An edit therefore moves children of
-// the nodes that it changed, and nothing else.
+// The layout of a wide hierarchy follows edits of its topology. It requires that the leaves below a wide node
+// lie side by side, and so do its other children; everything else may lie anywhere. An edit therefore moves
+// only children of the nodes that it changed.
 #include "core/families/wide/wide_edits.hpp"
 
 #include <algorithm>
@@ -14,7 +14,7 @@
 
 namespace kbvh {
 
-/// Follows one edit of a hierarchy's topology. First reads all that moves; then writes.
+/// Follows one edit of a hierarchy's topology. First reads everything that moves; then writes.
 template <class S>
 class WideFollower {
  public:
@@ -54,7 +54,7 @@ class WideFollower {
   static std::uint32_t inner_count(const WideNode& node) { return node.count - node.leaf_count; }
   std::size_t scalars() const { return lane_scalars(width_); }
 
-  /// Lets contents that have other ids keep their places; notes the contents that are no more.
+  /// Contents with new ids keep their places; records the contents that no longer exist.
   void move_places() {
     auto& places = h_.places_;
     places.resize(h_.topology_.size());
@@ -75,7 +75,7 @@ class WideFollower {
     places[0].node = none;  // a former child has no parent now
   }
 
-  /// Finds the nodes whose children do not lie with them.
+  /// Finds the nodes whose children do not lie next to each other.
   void find_changed() {
     const Topology& topology = h_.topology_;
     e_.changed.clear();
@@ -119,7 +119,7 @@ class WideFollower {
           !(keeps_nodes(changed) && lies_in(child, changed.layout.first_child, changed.inner)))
         child.carried = read_node(child.number);
   }
-  /// A changed node whose number of leaves, or of other children, stays the same keeps the place for them.
+  /// A changed node keeps the place of its leaves, or of its other children, if their number stays the same.
   static bool keeps_leaves(const Changed& changed) { return changed.leaves == changed.layout.leaf_count; }
   static bool keeps_nodes(const Changed& changed) { return changed.inner == inner_count(changed.layout); }
   static bool lies_in(const Child& child, std::uint32_t first, std::uint32_t count) {
@@ -157,7 +157,7 @@ class WideFollower {
     std::copy_n(h_.child_bounds_.data() + wide * scalars(), scalars(), content.rows);
     return std::uint32_t(e_.contents.size()) - 1;
   }
-  /// Reads the root's content unless it lies in wide node 0, where it belongs.
+  /// Reads the root's content unless it is in wide node 0, where it belongs.
   std::uint32_t read_root() {
     const std::uint32_t wide = h_.places_[0].wide;
     return wide == 0 ? stays : wide == none ? none : read_node(wide);
@@ -187,7 +187,7 @@ class WideFollower {
   }
 
   std::uint32_t take_leaves(std::uint32_t count) {
-    std::uint32_t& free = e_.free_leaves[count];  // of none, nothing was released
+    std::uint32_t& free = e_.free_leaves[count];  // nothing was released if count is 0
     if (free != none) return std::exchange(free, h_.first_entry_[free]);
     const auto first = std::uint32_t(h_.stamps_.size());
     for (auto* const list : {&h_.first_entry_, &h_.end_entry_, &e_.home, &h_.stamps_, &h_.fetched_})
@@ -220,7 +220,7 @@ class WideFollower {
     return e_.free_lists[length];
   }
 
-  /// Gives the children of a node their places. Those that lie there already stay.
+  /// Assigns places to the children of a node. Those that are already in place stay.
   void seat(Changed& changed) {
     WideNode& layout = changed.layout;
     if (!keeps_leaves(changed)) layout.first_leaf = take_leaves(changed.leaves);

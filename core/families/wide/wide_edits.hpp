@@ -20,8 +20,8 @@ struct WidePlace {
 /// The unique vertices of the leaves of a wide node, by lane.
 using LeafLists = std::array<std::span<const std::uint32_t>, 8>;
 
-/// The part of a wide hierarchy that only edits need: empty until the first one. Nodes and leaves whose
-/// places are given up form linked lists through the arrays of the layout, one list per number of neighbours.
+/// The part of a wide hierarchy that only edits need: empty until the first edit. Released nodes and leaves
+/// form linked lists through the arrays of the layout, one list per number of neighbours.
 template <class S>
 struct WideEdits {
   static constexpr std::uint32_t none = WidePlace::none;
@@ -34,12 +34,12 @@ struct WideEdits {
   std::array<std::uint32_t, 9> free_nodes{}, free_leaves{};  ///< [count]: first of that many
   std::vector<std::uint32_t> free_lists;                     ///< [length]
 
-  /// A node of which the edit changed the children.
+  /// A node whose children were changed by the edit.
   struct Changed {
     std::uint32_t node = none;
     std::uint32_t first = 0;  ///< of its children in `children`; leaves come first
     std::uint32_t leaves = 0, inner = 0;
-    WideNode layout{};  ///< before and then after the edit; without children if the node is new
+    WideNode layout{};  ///< before, and then after, the edit; without children if the node is new
   };
   struct Child {
     std::uint32_t node;
@@ -48,7 +48,7 @@ struct WideEdits {
     std::uint32_t first_entry, end_entry, home;  ///< of a leaf
     S bounds[6];                                 ///< as in a row
   };
-  /// All that the layout stores of a wide node that leaves its place.
+  /// All stored data of a wide node that leaves its place.
   struct Content {
     WideNode node;
     std::uint32_t listed, rank, height;

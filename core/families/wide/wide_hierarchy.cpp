@@ -29,7 +29,7 @@ void WideHierarchy<S>::place_nodes() {
   parent_.assign(1, 0);
   nodes_.clear();
   if (topology_.empty()) return;
-  // A root that is a leaf still needs a wide node to lie in.
+  // A root that is a leaf still needs a wide node to hold it.
   std::uint32_t inner = 0, leaves = 0;
   for (std::uint32_t i = 0; i < topology_.size(); ++i)
     if (!topology_.nodes[i].is_leaf()) places_[i].wide = inner++;
@@ -78,8 +78,8 @@ template <class S>
 void WideHierarchy<S>::find_subtrees() {
   subtrees_.clear();
   above_subtrees_.clear();
-  // Descendants are contiguous if nodes are numbered depth first with siblings in one row; other topologies
-  // are not divided.
+  // Descendants are contiguous if nodes are numbered depth first, with siblings next to each other; other
+  // topologies are not divided.
   std::vector<std::uint32_t> size(nodes_.size(), 1);
   for (std::uint32_t n = node_count(); n-- > 0;) {
     const WideNode& node = nodes_[n];
@@ -179,7 +179,7 @@ void WideHierarchy<S>::list_leaves(const Primitives& primitives) {
   stamps_.assign(leaves, 0);
   fetched_.assign(leaves, 0);
   stamp_ = 1;
-  // Leaves of one primitive need no boxes besides their own.
+  // Leaves of one primitive need no boxes other than their own.
   rows_.clear();
   rows_.resize(padded_leaf_size() == 1 ? 0 : leaves * lane_scalars(padded_leaf_size()));
 }

@@ -19,8 +19,8 @@ namespace kbvh {
 /// leaves in lists of equal length (core/families/wide/kernels/wide_layout.hpp). Any topology fits; perfect
 /// ones are fastest.
 ///
-/// The topology may be edited. Wide nodes keep their numbers as far as possible then, so parents may have
-/// larger numbers than their children, and refits follow a list of nodes; without edits there is none.
+/// The topology may be edited. Wide nodes then keep their numbers as far as possible, so parents may have
+/// larger numbers than their children, and refits follow a list of nodes; without edits there is no list.
 template <class S>
 class WideHierarchy : public WideTree<S> {
  public:
@@ -28,7 +28,7 @@ class WideHierarchy : public WideTree<S> {
   using WideTree<S>::leaf_count;
   using WideTree<S>::padded_leaf_size;
 
-  // Compiled once, and not with every strategy.
+  // Compiled once, instead of with every strategy.
   WideHierarchy();
   ~WideHierarchy();
   WideHierarchy(const WideHierarchy&);
@@ -46,10 +46,10 @@ class WideHierarchy : public WideTree<S> {
 
   /// Edits the topology in place: change(topology, edit) changes it and lists the changes, as SubtreeSwap and
   /// TopologyEditor do. Leaves may move, but their primitives must stay the same. The layout follows: nodes
-  /// with other children are written anew, and subtrees that moved are not touched below their roots.
-  /// O(width + greatest height) per changed node. Boxes move along; those of changed nodes, and all above,
-  /// are to be computed by `refit_edited` or `refit`. The first edit after `assign` is O(nodes). Allocates
-  /// only where it needs more nodes, leaves or longer lists of one size than ever before.
+  /// with other children are rewritten, and subtrees that moved are not touched below their roots. O(width +
+  /// greatest height) per changed node. Boxes move along; `refit_edited` or `refit` must compute those of
+  /// changed nodes and all above. The first edit after `assign` is O(nodes). Allocates only if it needs more
+  /// nodes, more leaves or longer lists of one size than ever before.
   template <class Change>
   void edit(Change&& change) {
     begin_edits();
@@ -62,22 +62,23 @@ class WideHierarchy : public WideTree<S> {
   void refit_edited(const S* positions);
   /// Returns whether the topology was edited since `assign`.
   bool edited() const { return edited_; }
-  /// Gives the leaves other primitives, each leaf as many as before: `order` holds them by entry of the
-  /// topology and is a permutation of what the topology holds. Nodes stay as they are. Boxes of changed
+  /// Gives the leaves other primitives, each leaf as many as before. `order` holds them by entry of the
+  /// topology and is a permutation of the topology's primitives. Nodes stay unchanged. Boxes of changed
   /// leaves and above are invalid until they are computed. Returns the number of wide nodes with a changed
   /// leaf. O(primitives) to compare, and O(vertices) per changed leaf. Allocates at the first call after
-  /// `assign`, and where a leaf has more vertices than ever before. Not after edits, nor are edits possible
-  /// afterwards.
+  /// `assign`, and when a leaf has more vertices than ever before. Not allowed after edits; no edits are
+  /// allowed afterwards.
   std::uint32_t refill(std::span<const std::uint32_t> order, const Primitives& primitives);
   /// Restores the topology of the last `assign`; boxes are invalid until they are computed. O(nodes).
   void undo_edits(const Primitives& primitives);
-  /// Returns the topology in built layout, and in nodes[i] the node of `topology` that is its node i.
+  /// Returns the topology in built layout; nodes[i] becomes the node of `topology` that corresponds to its
+  /// node i.
   Topology built_topology(std::vector<std::uint32_t>& nodes) const;
 
   /// Recomputes every box from positions [vertex][3], children first. O(nodes + vertices of leaves).
   void refit(const S* positions) { refit_all(this->arrays(), positions); }
-  /// Recomputes the boxes of the wide nodes [begin, end); children must be current, or in the range and
-  /// behind their parents. (After edits, they need not be behind them, and nodes may be unused.)
+  /// Recomputes the boxes of the wide nodes [begin, end). Children must be current, or lie in the range and
+  /// after their parents. (After edits, they need not lie after them, and nodes may be unused.)
   void refit_nodes(const S* positions, std::uint32_t begin, std::uint32_t end) {
     refit_(this->arrays(), positions, begin, end);
   }
@@ -91,8 +92,8 @@ class WideHierarchy : public WideTree<S> {
   }
   std::uint32_t node_count() const { return std::uint32_t(nodes_.size()); }
   /// Ranges of wide nodes that do not depend on each other, and the nodes above them, children first: work
-  /// that threads can share. No ranges where this would not pay, or where the topology is not numbered depth
-  /// first.
+  /// that threads can share. There are no ranges if this would not pay, or if the topology is not numbered
+  /// depth first.
   struct Subtree {
     std::uint32_t begin, end;
   };
@@ -100,9 +101,9 @@ class WideHierarchy : public WideTree<S> {
   /// Returns whether there are ranges, and no edit has changed the order of the nodes.
   bool can_be_shared() const { return !subtrees_.empty() && !edited_; }
   const std::vector<std::uint32_t>& above_subtrees() const { return above_subtrees_; }
-  /// Boxes and vertex lists as in WideArrays, to be moved to the memory of the threads that work on them:
-  /// new_place makes unset arrays, place copies the nodes [begin, end) and may be called by several threads
-  /// for different nodes, take_place replaces the arrays. Not after edits or refills.
+  /// Boxes and vertex lists as in WideArrays, to be moved to the memory of the threads that work on them.
+  /// new_place makes uninitialised arrays; place copies the nodes [begin, end), and several threads may call
+  /// it for different nodes; take_place replaces the arrays. Not after edits or refills.
   struct Placed {
     UnfilledArray<S> child_bounds, node_bounds;
     UnfilledArray<std::uint32_t> vertices;
@@ -155,7 +156,7 @@ class WideHierarchy : public WideTree<S> {
   void list_vertices();
   void list_leaves(const Primitives& primitives);
   void check_node_count() const;
-  /// Sets the length of a node's vertex lists, and the sum of their vertices.
+  /// Sets the length of a node's vertex lists, and the total number of their vertices.
   void measure_lists(std::uint32_t wide, const LeafLists& lists);
   /// Returns the place of new lists of one length for all lanes.
   std::uint32_t new_list(std::size_t length);

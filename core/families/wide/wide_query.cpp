@@ -57,7 +57,7 @@ void WideQuery<S>::traverse(const Side& a, const Side& b, WideTraversal& state) 
 
 template <class S>
 WideTraversal WideQuery<S>::fresh_traversal(const Budget& budget) {
-  own_leaves_.clear();  // of a query that was abandoned
+  own_leaves_.clear();  // left by an abandoned query
   stack_.resize(std::max<std::size_t>(stack_.size(), 1024));
   leaf_pairs_.resize(2 * leaf_pair_room);
   return {stack_.data(), 0, stack_.size(), leaf_pairs_.data(), 0, leaf_pair_room, 1, budget.box_tests};
@@ -115,10 +115,11 @@ template <class S>
 void WideQuery<S>::fetch_leaves(const Side& side, std::size_t which, std::size_t count) {
   if (side.positions != nullptr || !motion_) return;
   WideTree<S>& h = *side.hierarchy;
-  // Fetches missing positions all at once: calls with a few vertices each cost more than the vertices.
+  // Fetches all missing positions at once: calls for a few vertices each cost more than the vertices
+  // themselves.
   if (h.padded_leaf_size() == 1 || motion_->all_current(side.body)) return;
   to_fetch_.clear();
-  // Leaves that list so many corners need most positions: listing the others would cost more than evaluating
+  // Leaves with this many corners need most positions: listing the others would cost more than evaluating
   // all.
   const std::size_t most = std::max<std::size_t>(256, scene_->vertex_count(side.body) / 4);
   for (std::size_t i = 0; i < count; ++i) {

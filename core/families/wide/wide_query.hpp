@@ -21,7 +21,7 @@ struct WideSide {
   WideTree<S>* hierarchy;
   std::uint32_t body;  ///< its id in the pairs found
   /// Positions [vertex][3] of the hierarchy's primitives, readable up to one scalar past the end. Null: those
-  /// of the scene's body, which the query fetches where they are not current.
+  /// of the scene's body; the query fetches those that are not current.
   const S* positions = nullptr;
   /// One moment of a segment in which boxes are linear in time: the query computes the boxes that it reads
   /// into the hierarchy. The caller marks all nodes as stale first. Null: the stored boxes are current.
@@ -31,7 +31,7 @@ struct WideSide {
   const std::uint8_t* stale = nullptr;
 };
 
-/// Appends the pairs of primitives whose boxes overlap in the pairs of leaves [begin, end) of a list, of
+/// Appends the pairs of primitives whose boxes overlap in the pairs of leaves [begin, end) of a list, in
 /// which the leaves of side a are leaves[2 i]; adds the box tests made to `tests`. `positions_a` and
 /// `positions_b` are those of the sides, or of the scene. `chunk` is memory that is kept from call to call.
 template <class S>
@@ -45,26 +45,26 @@ class WideQuery {
  public:
   using Side = WideSide<S>;
 
-  /// Makes a query of hierarchies over positions that each side gives.
+  /// Creates a query of hierarchies over positions that each side provides.
   WideQuery() = default;
-  /// Makes a query of the bodies of a scene, at the time of the motion.
+  /// Creates a query of the bodies of a scene, at the time of the motion.
   WideQuery(const SceneView<S>& scene, const SampledMotion<S>& motion) : scene_(scene), motion_(motion) {}
 
   /// Appends the pairs of primitives whose boxes, and those of all nodes above them, overlap. Both
   /// hierarchies need the same width and leaf size; throws std::invalid_argument if they differ. Either both
-  /// sides have moments or none. If both bodies are the same, the hierarchies must be the same, too; the
-  /// result is the pairs within the body, without those that share a vertex unless the sides give positions
-  /// of their own. Returns the work that the budget left undone; adds the box tests made to `tests`.
+  /// sides have moments or none has. If both bodies are the same, the hierarchies must be the same, too; the
+  /// result is then the pairs within the body, without those that share a vertex unless the sides provide
+  /// their own positions. Returns the work that the budget left undone; adds the box tests made to `tests`.
   QueryStatus run(const Side& a, const Side& b, PairBuffer& out, std::uint64_t& tests,
                   const Budget& budget = {});
 
-  /// Appends the pairs of primitives whose boxes overlap in the given pairs of leaves, of which the leaves of
+  /// Appends the pairs of primitives whose boxes overlap in the given pairs of leaves, in which the leaves of
   /// side a are pairs[2 i]. The boxes of the leaves of side b must be current. Within one body, each two
   /// leaves are given once. Adds the box tests made to `tests`.
   void run_leaves(const Side& a, const Side& b, std::span<const LeafSlot> pairs, PairBuffer& out,
                   std::uint64_t& tests);
 
-  /// Wide nodes whose boxes a lazy query waits for; `none`: no wait on that side.
+  /// Wide nodes whose boxes a lazy query waits for; `none`: it does not wait on that side.
   struct Wanted {
     static constexpr std::uint32_t none = ~std::uint32_t(0);
     std::uint32_t first = none, second = none;
@@ -117,8 +117,8 @@ class WideQuery {
   WideTraversal lazy_{};
 };
 
-/// Checks that queries of two bodies have one layout: throws std::invalid_argument unless, for each pair of
-/// bodies, the hierarchies hierarchy_of(body) have one width and leaf size.
+/// Checks that both bodies of each queried pair have one layout: throws std::invalid_argument unless, for
+/// each pair of bodies, the hierarchies hierarchy_of(body) have the same width and leaf size.
 template <class HierarchyOf>
 void check_layouts(std::span<const BodyPair> pairs, HierarchyOf&& hierarchy_of) {
   for (const BodyPair& pair : pairs)

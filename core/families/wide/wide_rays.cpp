@@ -11,7 +11,7 @@ namespace kbvh {
 
 namespace {
 
-/// The tree over bodies is built anew when its boxes have grown by this factor.
+/// The tree over bodies is rebuilt when its boxes have grown by this factor.
 constexpr double bodies_worn_out = 1.5;
 
 /// Returns a number of the scalar that is not below x.

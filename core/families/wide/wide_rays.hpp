@@ -10,13 +10,13 @@
 
 namespace kbvh {
 
-/// What rays read of one body.
+/// The data of one body that rays read.
 template <class S>
 struct WideRaySide {
   WideTree<S>* hierarchy;
   /// stale[wide node] is not 0 while the boxes of the node's children must be made; null: all are current.
   const std::uint8_t* stale = nullptr;
-  /// A box around the body; if there is none, that of the hierarchy's root, which must be current.
+  /// A box around the body; without one, rays use that of the hierarchy's root, which must be current.
   std::optional<Box<S>> root{};
   /// Boxes of children as in `WideArrays`, in place of the hierarchy's; null: those of the hierarchy.
   S* child_bounds = nullptr;
@@ -27,16 +27,16 @@ struct WideRaySide {
   Box<S> root_box() const { return root ? *root : hierarchy->root_box(); }
 };
 
-/// What the rays of one call did with a body.
+/// The work of one call's rays in a body.
 struct RayWork {
   std::uint64_t tests = 0;  ///< box tests in its hierarchy
   std::uint64_t rays = 0;   ///< that entered it
 };
 
 /// Answers rays over the wide hierarchies of all bodies of a scene; keeps its buffers from call to call. A
-/// tree over the bodies' boxes, refitted at each call and built anew when the bodies have mixed, leads to the
-/// bodies, which are searched nearest first. This is occlusion culling: a body that lies behind the hits of
-/// all rays is never searched, its positions are not fetched, and none of its stale boxes are made.
+/// tree over the bodies' boxes, refitted at each call and rebuilt when the bodies have mixed, leads to the
+/// bodies, which are searched nearest first. This is occlusion culling: a body behind the hits of all rays is
+/// never searched, its positions are not fetched, and none of its stale boxes are made.
 template <class S>
 class WideRays {
  public:
@@ -47,8 +47,8 @@ class WideRays {
 
   /// Sets hits[i] to the answer to rays[i]. side_of(body) returns the WideRaySide<S> of a body, or its
   /// WideSide<S>. make(body, wide node) computes the boxes of the node's children and clears the node's mark;
-  /// all positions of the body are current then. Adds box tests, those of the filter of triangles included,
-  /// to `tests`, and to `bodies` what the call did with each body; null: this is not counted.
+  /// all positions of the body are then current. Adds box tests, including those of the filter of triangles,
+  /// to `tests`, and the call's work in each body to `bodies`; null: this is not counted.
   template <class SideOf, class Make>
   void find(RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits, const SideOf& side_of,
             const Make& make, TriangleTestStats& stats, std::uint64_t& tests, RayBodies* bodies = nullptr) {
@@ -69,8 +69,8 @@ class WideRays {
         query, rays, hits, side_of, [](std::uint32_t, std::uint32_t) {}, stats, tests, bodies);
   }
 
-  /// Builds the tree over the bodies anew at the next call, so that a restarted clip costs the same as
-  /// before.
+  /// Rebuilds the tree over the bodies at the next call, so that a restarted clip costs the same as the first
+  /// run.
   void start_over() { built_area_ = -1; }
 
   /// Returns the work of the last call for each body.
@@ -83,10 +83,10 @@ class WideRays {
            std::uint64_t& tests);
   void refit_bodies();
   void count_bodies(std::span<const Ray<S>> rays, RayBodies& bodies) const;
-  /// Returns bit i unless rays[i] certainly misses all bodies; of at most as many rays as a block has.
+  /// Returns bit i unless rays[i] certainly misses all bodies; takes at most as many rays as a block has.
   std::uint64_t screen(std::span<const Ray<S>> rays);
   void follow(const WideTree<S>& tree, WideRayJob<S>& job, std::vector<WideRayItem<S>>& stack);
-  /// Follows the current ray through one body. Returns whether the search is over.
+  /// Follows the current ray through one body. Returns whether the search has ended.
   bool enter(std::uint32_t body);
 
   SceneView<S> scene_;

@@ -1,5 +1,5 @@
 // Leaves of a wide hierarchy exchange primitives. Nothing else changes: nodes, numbers of primitives and the
-// order of memory stay, so the cost is that of writing the lists of the changed leaves.
+// order of memory stay, so the only cost is writing the lists of the changed leaves.
 #include "core/families/wide/wide_refill.hpp"
 
 #include <algorithm>
@@ -94,7 +94,7 @@ void WideHierarchy<S>::list_refilled(std::uint32_t wide, const Primitives& primi
   measure_lists(wide, lists);
   listed_total_ += listed_[wide];
   if (node.length > r.list_room[wide]) {
-    // Twice the need: lists that grow step by step leave less unused memory behind than they use.
+    // Twice the need: lists that grow step by step leave less unused memory than they use.
     const std::uint32_t room =
         std::max<std::uint32_t>(node.length, std::min(r.most_vertices, 2U * node.length));
     r.list_room[wide] = std::uint16_t(std::min(65535U, room));

@@ -6,14 +6,14 @@
 namespace kbvh {
 
 /// The part of a wide hierarchy that only exchanges of primitives between leaves need: empty until the first
-/// one.
+/// exchange.
 struct WideRefill {
   std::vector<std::uint32_t> start;      ///< primitives by entry of the topology, as assigned
   std::vector<std::uint32_t> leaf_node;  ///< [leaf]: its node of the topology
   std::vector<std::uint16_t> list_room;  ///< [wide node]: largest length of its vertex lists in their place
-  /// Corners of every primitive; 0: primitives differ in that, and all corners are listed anew each time.
+  /// Corners of every primitive; 0: the numbers differ, and all corners are listed again each time.
   std::uint32_t corners = 0;
-  std::uint32_t most_vertices = 0;  ///< upper bound of a leaf's
+  std::uint32_t most_vertices = 0;  ///< upper bound of a leaf's vertices
   // For temporary use.
   std::vector<std::uint32_t> seen;  ///< [vertex]: stamp of the last leaf that holds it
   std::uint32_t stamp = 0;

@@ -71,11 +71,11 @@ class WideTree {
     return {primitives_.data() + first_entry_[leaf], primitives_.data() + end_entries()[leaf]};
   }
   /// Returns the number of lanes for the primitives of a leaf in a query; 1: the leaf's box is that of its
-  /// primitive.
+  /// only primitive.
   std::uint32_t padded_leaf_size() const {
     return leaf_size_ == 1 ? 1 : leaf_size_ <= 4 ? 4 : leaf_size_ <= 8 ? 8 : 16;
   }
-  /// Returns whether one query can take both hierarchies.
+  /// Returns whether one query can process both hierarchies.
   bool suits(const WideTree& other) const {
     return empty() || other.empty() ||
            (width_ == other.width_ && padded_leaf_size() == other.padded_leaf_size());
@@ -118,7 +118,7 @@ class WideTree {
   std::vector<std::uint32_t> first_corner_, corners_, primitives_, stamps_, fetched_;
   UnfilledArray<S> rows_;  ///< of a leaf: set when its stamp is
   std::uint32_t stamp_ = 1;
-  bool only_triangles_ = false;  ///< and corners are listed
+  bool only_triangles_ = false;  ///< true if corners are listed, too
 };
 
 }  // namespace kbvh

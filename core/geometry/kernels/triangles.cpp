@@ -114,8 +114,8 @@ constexpr Apex apex(unsigned negatives) {
 
 /// With direction = side(p) side(q), the intervals overlap iff direction orient3d(p, p_low, q, q_high) >= 0
 /// and direction orient3d(p, p_high, q, q_low) <= 0. On side +1 the edge to the next corner ends the interval
-/// of a above and the interval of b below; on side -1 conversely. Where direction is -1, low and high are
-/// exchanged once more, which reverses both conditions.
+/// of a above and the interval of b below; on side -1 it is the other way round. Where direction is -1, low
+/// and high are exchanged again, which reverses both conditions.
 struct Orders {
   Order order[64];
 };

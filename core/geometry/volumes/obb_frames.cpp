@@ -72,7 +72,8 @@ void ObbFrames::consider(const double* edge, const double* normal, double& least
   double axis[3][3];
   std::copy_n(edge, 3, axis[0]);
   if (!normalise(axis[0])) return;
-  // The normal of a thin triangle is not at a right angle to its edges; two orthogonalisations suffice.
+  // The normal of a thin triangle is not exactly at a right angle to its edges; two orthogonalisations
+  // suffice.
   std::copy_n(normal, 3, axis[1]);
   for (int round = 0; round < 2; ++round) {
     const double along = dot(axis[0], axis[1]);

@@ -12,7 +12,7 @@ const root = fileURLToPath(new URL('../../..', import.meta.url));
 export const built = join(root, 'build/lab/index.html');
 if (!existsSync(built)) throw new Error(`${built} is missing: run experiments/lab`);
 
-/** Starts a browser that draws WebGL in software, and the page beside it without WebGL; `open` gives pages, `close` ends it. */
+/** Starts a browser that draws WebGL in software, and the same page without WebGL; `open` gives pages, `close` ends it. */
 export async function startBrowser() {
   const { browser, close } = await startChromium(['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--disable-gpu-compositing']);
   return { open: (options) => open(browser, options), close };

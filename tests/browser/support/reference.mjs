@@ -1,4 +1,4 @@
-// What the native program says of a scene, and how states of the engine are compared with it.
+// The native program's results on a scene, and how states of the engine are compared with it.
 
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
@@ -22,7 +22,7 @@ export function native(scene, strategy, precision = 'float64', params = {}) {
 /** JSON keeps no infinities and no signs of zeros. */
 export const plain = (value) => JSON.parse(JSON.stringify(value));
 
-/** Expects the frame of the engine to be the native one, to the last bit but for the signs of zeros. */
+/** Expects the frame of the engine to be the native one, to the last bit, except for the signs of zeros. */
 export function expectFrame(state, frame, place) {
   assert.equal(state.time, frame.t, place);
   assert.deepEqual(plain([...state.pairs]), frame.pairs, `${place}: pairs`);

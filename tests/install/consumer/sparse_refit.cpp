@@ -1,5 +1,5 @@
-// A refit that detects motion: leaves whose vertices did not move are skipped, and so are all nodes above
-// them whose children's boxes did not change. The comparisons pay where large parts of a body rest.
+// A refit that detects motion: it skips leaves whose vertices did not move, and all nodes above them whose
+// children's boxes did not change. The comparisons pay where large parts of a body rest.
 
 #include <algorithm>
 

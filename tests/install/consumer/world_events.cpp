@@ -38,7 +38,7 @@ int main() try {
     for (const kbvh::WorldBoundChange& change : step.touched)
       std::printf("  node %u, side %u: vertex %u instead of %u\n", change.node, change.side,
                   change.new_vertex, change.old_vertex);
-    std::printf("  %zu certificates made anew, next event at t = %g\n", step.rescheduled.size(),
+    std::printf("  %zu certificates rescheduled, next event at t = %g\n", step.rescheduled.size(),
                 world.next_event_time());
   }
   world.advance(1);

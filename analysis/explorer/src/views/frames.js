@@ -1,4 +1,4 @@
-// Frames of one cell: the worst ones, the latency over the clip, and query time beside the quality of the tree.
+// Frames of one cell: the worst ones, the latency over the clip, and query time next to the quality of the tree.
 import * as Plot from "@observablehq/plot";
 import { clippedMarks, dotLook, figure, lineLook, logAxis, logScale, meanLook, rowLabels } from "../chart.js";
 import { make, paintOf } from "../dom.js";
@@ -214,7 +214,7 @@ function over({ state, choose }, cell, runs, kind, title, reading, unit, samples
   });
 }
 
-/** How much worse than the median is the worst frame, in every cell. */
+/** How much worse than the median the worst frame is, in every cell. */
 function stutter({ model, state, choose }, cells) {
   const of = new Map();
   for (const series of cells.values())

@@ -1,4 +1,4 @@
-// How often is who within a factor of the best, and every cell in one picture.
+// How often each strategy is within a factor of the best, and every cell in one picture.
 import * as Plot from "@observablehq/plot";
 import { dotLook, figure, lineLook, logScale } from "../chart.js";
 import { make, symbol } from "../dom.js";
@@ -133,7 +133,7 @@ function row(one) {
   ];
 }
 
-/** The legend of the profile, in order: who is it, and what do the lines say in numbers. */
+/** The legend of the profile, in order: the strategies, and what their lines say in numbers. */
 function ranking({ state, set, othersButton }, found) {
   if (!found.length) return null;
   const bar = (share) => make("td", { class: "n bar", style: `--share:${share}`, text: percent(share) });

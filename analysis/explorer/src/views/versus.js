@@ -1,4 +1,4 @@
-// Two commits or two machines beside each other.
+// Two commits or two machines side by side.
 import * as Plot from "@observablehq/plot";
 import { clippedMarks, dotLook, figure, logAxis, logScale, meanLook, rowLabels } from "../chart.js";
 import { choice, make, paintOf } from "../dom.js";

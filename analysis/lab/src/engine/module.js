@@ -73,7 +73,7 @@ class EngineModule {
   get size() {
     return this.#module._sbrk(0);
   }
-  /** A copy of everything that the engine is. */
+  /** A copy of the engine's whole state. */
   snapshot() {
     return this.#module.HEAPU8.slice(0, this.size);
   }

@@ -104,7 +104,7 @@ export class Timeline {
     return this.#go(0, null, 0);
   }
 
-  /** Goes on, event by event, to the first one that `matches`; returns it, packed, or null and stands at `until`. */
+  /** Continues, event by event, to the first one that `matches`; returns it, packed, or stops at `until` and returns null. */
   runEvents(until, matches) {
     for (;;) {
       const step = this.event(until);
@@ -116,7 +116,7 @@ export class Timeline {
     }
   }
 
-  /** Goes on, frame by frame, until a pair begins; returns whether one did. */
+  /** Continues, frame by frame, until a pair begins; returns whether one did. */
   runToPair(until) {
     let before = this.#pairs();
     for (;;) {
@@ -175,7 +175,7 @@ export class Timeline {
 
   /**
    * Plays all frames of a scene just loaded, without a log of events and without snapshots. Returns the milliseconds of each: of the
-   * first one, the start. Load anew before anything else is asked but the state.
+   * first one, the start. Load the scene again before asking for anything but the state.
    */
   time() {
     return [1000 * this.#seconds, ...this.#module.call('time', { times: this.#stops.slice(1).map(({ t }) => t) })];

@@ -4,7 +4,7 @@ import {checkState} from './permalink.js';
 /** The largest mesh that the lab takes. */
 export const mostPrimitives = 40000;
 
-/** The scenes of a study that `kbvh lab --study` serves beside the page; none if the page was opened as a file. */
+/** The scenes of a study that `kbvh lab --study` serves next to the page; none if the page was opened as a file. */
 export async function studyScenes() {
   if (!location.protocol.startsWith('http')) return [];
   try {

@@ -23,7 +23,7 @@ export function initialState() {
     notice: '',              // what the last action did, for the live region
     strategies: [],          // from the engine
     meanings: new Map(),     // of counters, by name
-    study: [],               // scenes of a study beside the page: {name, framesPerSecond, files}
+    study: [],               // scenes of a study next to the page: {name, framesPerSecond, files}
     scene: null, sceneId: null,
     strategy: 'kinetic_aabb', params: {}, topology: {}, precision: 'float64',
     info: null,              // what load() returned

@@ -1,5 +1,5 @@
 /**
- * Who realises a side since when, until when: from the history of events, the flight plans and the queue.
+ * Which vertex realises a side, since when and until when: from the history of events, the flight plans and the queue.
  */
 import {axisOf, isUpper, polyline} from '../math/plans.js';
 import {envelope} from '../math/envelope.js';

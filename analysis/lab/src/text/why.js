@@ -12,7 +12,7 @@ const node = (body, id) => ({node: id, body});
 /** Names of the kinds of events. */
 export const kindNames = {
   bound: 'a bound changes hands', boxes_meet: 'two boxes meet', boxes_separate: 'two boxes part',
-  review: 'a pair of boxes is looked at again', window: 'the pairs to watch are chosen anew',
+  review: 'a pair of boxes is looked at again', window: 'the pairs to watch are chosen again',
 };
 
 /** One line about an event, for lists. */
@@ -23,7 +23,7 @@ export function title(event, bodies) {
   if (event.kind === 'boxes_meet') return `box ${event.node}${at} meets box ${other}`;
   if (event.kind === 'boxes_separate') return `box ${event.node}${at} parts from box ${other}`;
   if (event.kind === 'review') return `boxes ${event.node}${at} and ${other} are looked at again`;
-  return 'the pairs to watch are chosen anew';
+  return 'the pairs to watch are chosen again';
 }
 
 /** The time of an event in words: exact if its crossing is known. */
@@ -163,7 +163,7 @@ function pairStory(step, {bodies, trees}) {
     case 'review':
       return [{heading: 'What happens', parts: ['The list searches for the next time at which ', a, ' and ', b, ' meet or part: this', ...at, 'No bound and no pair changes.']}];
     default:
-      return [{heading: 'What happens', parts: ['The strategy chooses anew which pairs it watches: this', ...at]}];
+      return [{heading: 'What happens', parts: ['The strategy chooses again which pairs it watches: this', ...at]}];
   }
 }
 

@@ -1,4 +1,4 @@
-/** The chosen box: who realises each side since when, until when. */
+/** The chosen box: which vertex realises each side, since when and until when. */
 import {html, Unfilled, useMemo} from './dom.js';
 import {sideName} from '../math/plans.js';
 import {short} from '../math/exact.js';

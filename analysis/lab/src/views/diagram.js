@@ -175,7 +175,7 @@ export function Diagram({lab, state}) {
     }
   };
 
-  /** The strip below: who realises the side from when to when. */
+  /** The strip below: which vertex realises the side, and when. */
   const drawTenures = (c, {width, height, colours, X}) => {
     const y = height - bottom + 3, h = 10;
     c.save();

@@ -117,7 +117,7 @@ export function haloText(context, text, x, y, colour, halo) {
 }
 
 /**
- * Draws names beside points so that none covers another: each takes the first free one of four corners. A name that finds none is left
+ * Draws names next to points so that none covers another: each takes the first free one of four corners. A name that finds none is left
  * out, unless it `must` be seen. `labels`: {x, y, text, colour, must}; `frame`: {width, height, colours} of the canvas, which no name leaves.
  * Returns the rectangles taken, as [x0, y0, x1, y1].
  */

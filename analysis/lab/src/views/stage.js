@@ -1,4 +1,4 @@
-/** The stage: the scene at the present time, in the plane or in space, alone or with a second strategy beside it. */
+/** The stage: the scene at the present time, in the plane or in space, alone or with a second strategy next to it. */
 import {html} from './dom.js';
 import {Stage2d} from './stage2d.js';
 import {Stage3d} from './stage3d.js';

@@ -1,4 +1,4 @@
-/** Two strategies, their work per frame as small multiples, and who did less in total. */
+/** Two strategies, their work per frame as small multiples, and which of them did less in total. */
 import {html, Canvas, font, pointerAt, ticks} from './dom.js';
 import {workMetrics} from '../state/compare.js';
 import {frameAt} from '../math/plans.js';

@@ -29,7 +29,7 @@ template <class S, std::uint32_t width, bool rounds>
   constexpr std::size_t parts = width / lanes;
   using V = Vector<S, lanes>;
   const Blend<S> blend = shared;
-  // Half a unit more above 1, where numbers are not as close.
+  // Half a unit more above 1, where numbers are further apart.
   [[maybe_unused]] const S inwards = 1 - blend.rounding,
                            outwards = 1 + (blend.rounding + (sizeof(S) == 4 ? S(0x1p-24) : S(0x1p-53)));
   for (std::size_t n = 0; n < count; ++n) {

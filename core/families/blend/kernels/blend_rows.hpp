@@ -12,23 +12,23 @@ enum class KernelSet : std::uint8_t;
 /// One term of a blend of boxes: ranges of one quantity below every child, and its weight in the blend.
 template <class S>
 struct BlendTerm {
-  /// Rows [6][width] as in WideArrays::child_bounds; those of a node lie `Blend::stride` scalars after those
-  /// of the node before.
+  /// Rows [6][width] as in WideArrays::child_bounds; those of a node start `Blend::stride` scalars after
+  /// those of the node before.
   const S* rows;
   S weight;  ///< not negative
-  /// 0, or 1: the quantity is multiplied by minus the weight, which exchanges lower and upper sides.
+  /// 0, or 1: the quantity is multiplied by the negated weight, which swaps lower and upper sides.
   std::uint32_t mirrored;
 };
 
 /// Boxes as weighted sums of stored boxes: side i of a child is the sum of weight * side over all terms, plus
-/// the offset of the side. A sum of intervals contains the sum of any members (interval arithmetic).
+/// the offset of the side. A sum of intervals contains the sum of any of their members (interval arithmetic).
 template <class S>
 struct Blend {
   const BlendTerm<S>* terms;
   std::uint32_t count;  ///< at least 1
   std::size_t stride;
-  S offset[6];  ///< as rows: added to lower x, y, z and to -upper x, y, z, after all terms
-  /// Not 0: every side moves outwards by this share of its terms' magnitudes.
+  S offset[6];  ///< as in rows: added to lower x, y, z and to -upper x, y, z, after all terms
+  /// If not 0: every side moves outwards by this share of its terms' magnitudes.
   S rounding;
 };
 

@@ -23,7 +23,7 @@ template <class S, std::uint32_t each>
   for (std::uint32_t k = 0; k < job.count; k += 4) {
     Pack lower[4], upper[4], centre[4];
     for (std::uint32_t j = 0; j < 4; ++j) {
-      const std::uint32_t index = k + j < job.count ? k + j : job.count - 1;  // repeats the last one
+      const std::uint32_t index = k + j < job.count ? k + j : job.count - 1;  // the last one repeats
       const std::uint32_t primitive = job.living == nullptr ? index : job.living[index];
       const std::uint32_t* corner = job.vertices + (each == 0 ? job.offsets[primitive] : each * primitive);
       const std::uint32_t corners = each == 0 ? job.offsets[primitive + 1] - job.offsets[primitive] : each;
@@ -59,7 +59,7 @@ void primitive_boxes(const PrimitiveBoxesJob<S>& job) {
     boxes_of<S, 0>(local);
 }
 
-/// Cells, codes: as many as values of S fit into a register.
+/// Cells and codes: as many as there are values of S in a register.
 template <class S>
 constexpr std::size_t key_lanes = native_lanes<S>;
 template <class S>
@@ -135,7 +135,7 @@ template <class S, Curve curve>
       if (job.dropped_bits == 0) ++counts[2 * bins + (codes[j] >> 2 * code_digit_bits)];
     }
   }
-  // Without its lowest bits, a code has two digits.
+  // A code without its lowest bits has two digits.
   if (job.histogram != nullptr && job.dropped_bits != 0) job.histogram[2 * bins] += job.count;
 }
 

@@ -36,13 +36,13 @@ struct CurveKeysJob {
   const std::uint32_t* living;
   std::uint32_t count;
   Curve curve;
-  std::uint32_t dropped_bits;  ///< the lowest bits of the code, which are left out
+  std::uint32_t dropped_bits;  ///< number of lowest bits of the code that are left out
   S lower[3];                  ///< corner of the grid
   S scale[3];                  ///< cells per unit
   std::uint64_t* keys;
-  /// [2][3][2048], added to: counts of the code's digits of 11 bits, the lowest first, for keys with even and
-  /// with odd places, because neighbours often have one digit, and its count would be waited for. May be
-  /// null.
+  /// [2][3][2048], added to: counts of the code's digits of 11 bits, the lowest first, for keys at even and
+  /// at odd places. Neighbours often share a digit, and a single counter would have to wait for its last
+  /// update. May be null.
   std::uint32_t* histogram;
 };
 inline constexpr std::uint32_t code_digit_bits = 11, code_digits = 3;
@@ -65,8 +65,8 @@ struct BuildKernels {
   void (*curve_keys)(const CurveKeysJob<S>& job);
   /// [padded leaf size 1, 4, 8, 16]
   void (*leaf_rows[4])(const LeafRowsJob<S>& job);
-  /// Computes the boxes of the 8-wide nodes [0, count) of a hierarchy whose parents have smaller numbers than
-  /// their children.
+  /// Computes the boxes of the 8-wide nodes [0, count) of a hierarchy in which parents have smaller numbers
+  /// than their children.
   void (*nodes)(WideArrays<S> hierarchy, const S* leaf_boxes, std::uint32_t count);
 };
 KBVH_DECLARE_KERNELS(BuildKernels<float>, build_float)

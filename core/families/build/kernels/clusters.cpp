@@ -20,7 +20,8 @@ void nearest(const NearestJob& shared) {
     const float* const own = job.rows + i;
     float sides[6];
     for (std::size_t row = 0; row < 6; ++row) sides[row] = own[row * job.stride];
-    // Ranks the places: the other one of clusters 2k and 2k + 1 comes first, that side before the other.
+    // Ranks the places: the other one of clusters 2k and 2k + 1 comes first, then its side before the other
+    // side.
     const std::int32_t first_place = std::int32_t(radius) - std::int32_t(i & 1U);
     Words best{};
     for (std::int32_t place = 0; place < places; place += std::int32_t(lanes)) {
@@ -31,7 +32,7 @@ void nearest(const NearestJob& shared) {
         common[row] = smaller(load_lanes<Values>(other + row * job.stride), Values{} + sides[row]);
       const Values x = common[0] + common[3], y = common[1] + common[4], z = common[2] + common[5];
       const Values area = x * y + y * z + z * x;  // of negative lengths
-      // The surface and, in its lowest bits, the rank of the place: the sign of a zero is dropped.
+      // The surface with the rank of the place in its lowest bits; the sign of a zero is dropped.
       const Words word = (__builtin_bit_cast(Words, area) & std::int32_t(0x7fffffff & ~(places - 1))) |
                          ((lane_numbers + place) ^ first_place);
       best = place == 0 ? word : smaller(best, word);
@@ -101,7 +102,7 @@ std::uint32_t partition(const BinsJob& shared, std::uint32_t* items, std::uint32
     constexpr float last = float(sah_bins - 1);
     const float place = (box[axis] + box[axis + 4] - job.lower[axis]) * job.scale[axis];
     const bool stays = std::uint32_t(std::int32_t(smaller(larger(place, 0.0F), last))) <= last_bin;
-    // Without a branch, which would be unpredictable.
+    // Branchless, because the branch would be unpredictable.
     const std::uint32_t other = items[right - 1];
     items[right - 1] = stays ? other : item;
     items[left] = stays ? item : other;

@@ -31,9 +31,9 @@ struct BinsJob {
 inline constexpr std::uint32_t sah_bins = 16;
 
 struct ClusterKernels {
-  /// Finds for each cluster the partner among the nearest `radius` on each side with the smallest surface of
-  /// the common box, up to the last few bits of it. Of equals, cluster 2k takes 2k + 1, then the next ones on
-  /// that side; 2k + 1 takes 2k, then the ones before: equal clusters choose each other.
+  /// Finds for each cluster the partner among the nearest `radius` on each side for which the common box has
+  /// the smallest surface, compared without the last few bits. Among equals, cluster 2k takes 2k + 1, then
+  /// the next ones on that side; 2k + 1 takes 2k, then the ones before: equal clusters choose each other.
   void (*nearest8)(const NearestJob& job);
   void (*nearest16)(const NearestJob& job);
   void (*bins)(const BinsJob& job);

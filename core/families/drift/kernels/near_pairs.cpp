@@ -12,10 +12,11 @@ constexpr std::size_t lanes_of = [] {
   return fit * sizeof(S) < 16 ? std::size_t(1) : fit;  // there are no shorter registers
 }();
 
-// Gaps are compared with margins and reaches that are larger than these motions need by 2^-16 of themselves,
-// which covers roundings of gaps and margins. What is left are shares of coordinates: `rounding` of both
-// bodies, half a unit for a side that is moved by two sums, each, and half a unit for products of roundings.
-// The coordinates of one of two boxes suffice, for those of the other one differ by the gap.
+// Gaps are compared with margins and reaches that exceed the values that these motions need by a relative
+// 2^-16, which covers the roundings of gaps and margins. The remaining errors are shares of coordinates:
+// `rounding` of both bodies, half a unit each for a side that is moved by two sums, and half a unit for
+// products of roundings. The coordinates of one of the two boxes suffice, because those of the other differ
+// by the gap.
 template <class S>
 constexpr S unit = sizeof(S) == 4 ? S(0x1p-24) : S(0x1p-53);
 template <class S>
@@ -35,7 +36,7 @@ template <class S>
   return {{box.upper[0], box.upper[1], box.upper[2], -box.lower[0], -box.lower[1], -box.lower[2]}};
 }
 
-/// Returns the same, moved outwards by what vertices may be off by.
+/// Returns the box, moved outwards by the largest error of vertices.
 template <class S>
 [[gnu::always_inline]] inline Bounds<S> loosened(Bounds<S> box, S rounding) {
   for (S& bound : box.bound) bound += share_of(bound, rounding);
@@ -168,7 +169,7 @@ void drift(const S* now, const S* before, std::size_t vertices, S* interval) {
   std::size_t v = 0;
   for (; v + lanes <= vertices; v += lanes) take(v);
   if (v != vertices && vertices >= lanes) {
-    take(vertices - lanes);  // the last ones once more
+    take(vertices - lanes);  // the last ones again
     v = vertices;
   }
   S low[3 * lanes], high[3 * lanes];

@@ -23,7 +23,7 @@ struct NearLeaves {
   std::uint32_t stamp;
   const S* positions;
   S margin[6];  ///< margin by which the hierarchy's rows exceed the vertices: lower sides, upper ones
-  S rounding;   ///< and what vertices may be off by beyond that, over their coordinates
+  S rounding;   ///< additional error of vertices, relative to their coordinates
 };
 
 /// Turns pairs of leaves into pairs of primitives whose boxes may meet while the two bodies close in on each
@@ -55,7 +55,7 @@ struct NearKernels {
   /// (`leaf_pair_step`).
   using Near = void (*)(LeafNear<S>& state);
   /// Inflates all boxes of a hierarchy by the margin, lower sides x, y, z, upper sides x, y, z, and by
-  /// `rounding` of each side, with more for the roundings of this function.
+  /// `rounding` of each side, with an allowance for the roundings of this function.
   using Widen = void (*)(WideArrays<S> hierarchy, std::uint32_t node_count, const S* margin, S rounding);
   Near near_padded[3][3];  ///< [log2(width) - 1][padded leaf size 4, 8, 16]
   Widen widen_width[3];    ///< [log2(width) - 1]

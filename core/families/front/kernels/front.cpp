@@ -22,9 +22,9 @@ constexpr unsigned low_bits(unsigned count) {
   return (1U << count) - 1;
 }
 
-/// Appends pairs of leaves: `pair` with each lane of a mask added, `shift` bits up. Writes eight pairs, of
-/// which those behind the last lane do not count: the number of lanes changes from call to call, and a loop
-/// over them would be mispredicted each time.
+/// Appends pairs of leaves: `pair` with each lane of a mask added, `shift` bits up. Writes eight pairs; those
+/// after the last lane do not count. The number of lanes changes from call to call, so a loop over the lanes
+/// would be mispredicted each time.
 template <unsigned shift>
 [[gnu::always_inline]] inline void emit_lanes(FrontUpdate& update, std::uint64_t pair, unsigned mask) {
   static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "a pair is stored as one number, first slot low");
@@ -63,7 +63,7 @@ struct Front {
     ++update.descended;
   }
   /// Keeps the entry unless its boxes are apart; its parent has found the same, because it compares the same
-  /// boxes. `own_boxes_meet()` is asked only where no children overlap.
+  /// boxes. `own_boxes_meet()` is called only if no children overlap.
   template <class Meet>
   [[gnu::always_inline]] void keep(const FrontPair& pair, std::uint64_t met, const Meet& own_boxes_meet) {
     if (met != 0 || own_boxes_meet())
@@ -81,7 +81,7 @@ struct Front {
     for (; rows != 0; rows &= rows - 1) {
       const std::uint32_t i = lowest(rows);
       unsigned row = view.meeting_b(pair.second, view.lane_a(pair.first, i));
-      // For a node with itself, the other half mirrors this one.
+      // For a node paired with itself, the other half mirrors this one.
       if (within_one && pair.first == pair.second) row &= ~0U << i;
       met |= std::uint64_t(row) << (8 * i);
       if (i < node_a.leaf_count) {

@@ -30,7 +30,7 @@ struct FrontUpdate {
   LeafSlot* out;                ///< pairs of overlapping leaves: first, second, first, second, ...
   std::size_t found, out_room;  ///< in pairs
   std::uint64_t tests, test_limit;
-  std::uint64_t descended, climbed;  ///< entries made, entries dropped
+  std::uint64_t descended, climbed;  ///< number of entries made, and dropped
   bool done() const { return depth == 0 && next == end; }
 };
 /// The space for pairs of leaves that one step may write, in pairs.

@@ -39,7 +39,7 @@ template <class S>
 requires(in_registers<S>) struct PointOf<S> {
   using type = Vector<S, 4>;
 };
-/// A point in four lanes, of which the last one means nothing.
+/// A point in four lanes; the last lane is unused.
 template <class S>
 using Point = typename PointOf<S>::type;
 
@@ -71,8 +71,8 @@ template <class S>
 struct Cell {
   std::int32_t at[3];
 };
-/// Returns the cell of a point, that of the nearest point of the region if it is outside: never decreases
-/// along an axis, whatever is rounded.
+/// Returns the cell of a point; for a point outside of the region, the cell of the nearest point inside. With
+/// any rounding, cells never decrease along an axis.
 template <class S>
 [[gnu::always_inline]] inline Cell cell_of(Point<S> p, Point<S> lower, Point<S> upper, S scale) {
   const Point<S> way = smaller(larger(p, lower), upper) - lower;
@@ -200,7 +200,7 @@ void look_up(GridLookUpJob<S>& shared) {
       if (level.count == 0) continue;
       const Cell from = cell_of<S>(load(box) - load(level.reach), lower, upper, level.scale);
       const Cell to = cell_of<S>(load(box + 4), lower, upper, level.scale);
-      std::uint32_t cells[3];  // along each axis; at most all of them, once
+      std::uint32_t cells[3];  // along each axis; each cell at most once
       for (int axis = 0; axis < 3; ++axis) {
         const std::uint32_t all = 1U << level.bits[axis],
                             span = std::uint32_t(to.at[axis] - from.at[axis]) + 1;

@@ -31,7 +31,7 @@ struct GridSelectJob {
 inline constexpr std::uint32_t grid_levels = 8;
 
 /// The cells for boxes of similar size. Numbers of cells along an axis are taken modulo a power of two, so
-/// that the array of cells stays small however far the region reaches.
+/// that the array of cells stays small, however far the region extends.
 template <class S>
 struct GridLevel {
   S most_size;          ///< the longest side of a box of this level; infinite for the last level
@@ -62,7 +62,7 @@ struct GridPair {
   std::uint32_t own, entered;
 };
 
-/// The boxes that meet boxes in a grid; can pause and resume.
+/// A search for the boxes that meet boxes in a grid; can pause and resume.
 template <class S>
 struct GridLookUpJob {
   const S* boxes;
@@ -91,7 +91,7 @@ struct GridKernels {
   void (*cells)(const GridCellsJob<S>& job);
   /// Continues until all boxes are looked up, or `out` might not have room for the next one's pairs.
   void (*between)(GridLookUpJob<S>& job);
-  /// The same where `ids` are the entries: each two different boxes once.
+  /// Does the same if `ids` are the entries: each two different boxes once.
   void (*within)(GridLookUpJob<S>& job);
 };
 KBVH_DECLARE_KERNELS(GridKernels<float>, grid_float)

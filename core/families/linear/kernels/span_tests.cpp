@@ -130,7 +130,7 @@ template <class S>
   const Point<S>* const a1[3] = {&zero, &last.a1, &last.a2};
   const Point<S>* const b0[3] = {&first.b0, &first.b1, &first.b2};
   const Point<S>* const b1[3] = {&last.b0, &last.b1, &last.b2};
-  // The side of the plane of b on which each corner of a lies, and conversely.
+  // The side of the plane of b on which each corner of a lies, and vice versa.
   Sign<S> side_a[3], side_b[3];
   {
     const Linear<S> u = difference(*b0[1], *b1[1], *b0[0], *b1[0]),

@@ -20,13 +20,14 @@ enum class SpanVerdict : std::uint8_t { open, apart, intersect };
 /// the middle of the span.
 ///
 /// Intersecting: one edge passes through the inside of the other triangle. The signs that prove this are
-/// cubics in time; if all Bernstein coefficients of a cubic have one sign, so has the cubic throughout.
+/// cubics in time; if all Bernstein coefficients of a cubic have one sign, the cubic has this sign
+/// throughout.
 template <class S>
 struct SpanTestKernels {
-  /// Writes the certain verdicts on `count` pairs. `rounding` bounds the distance of a component of a
-  /// difference of two corners, at a frame and as computed, from that of the linear motion, over the largest
-  /// coordinate of the pair; that of a gap, along a direction whose absolute components add up to 1, is twice
-  /// as large at most. Gaps and coefficients within these bounds leave a pair open. Reads one scalar past
+  /// Writes the certain verdicts on `count` pairs. `rounding` bounds the error of a component of a difference
+  /// of two corners, at a frame and as computed, against the linear motion, relative to the largest
+  /// coordinate of the pair. The error of a gap along a direction whose absolute components add up to 1 is at
+  /// most twice as large. Gaps and coefficients within these bounds leave a pair open. Reads one scalar past
   /// each corner.
   void (*decide)(const SpanPair<S>* pairs, std::size_t count, S rounding, SpanVerdict* verdicts);
 };

@@ -11,7 +11,7 @@ constexpr std::size_t lanes_of = [] {
   return fit * sizeof(S) < 16 ? std::size_t(1) : fit;  // there are no shorter registers
 }();
 
-/// One number for each of eight children, in as many registers as that takes.
+/// One number for each of eight children, in as many registers as necessary.
 template <class S>
 struct Eight {
   static constexpr std::size_t lanes = lanes_of<S>, parts = 8 / lanes;
@@ -47,7 +47,7 @@ template <class S>
   return all;
 }
 
-/// Returns the lanes in another order: lane i is lane i ^ distance.
+/// Returns the lanes in another order: lane i comes from lane i ^ distance.
 template <std::size_t distance, class S>
 [[gnu::always_inline]] inline Eight<S> exchanged(const Eight<S>& a) {
   constexpr std::size_t lanes = Eight<S>::lanes, d = distance;
@@ -73,7 +73,7 @@ template <class S>
   a = smaller(a, exchanged<2>(a));
   return smaller(a, exchanged<4>(a));
 }
-/// Returns for each lane the smallest of the seven others; `all` is that of all.
+/// Returns for each lane the smallest of the seven others; `all` is the smallest of all.
 template <class S>
 [[gnu::always_inline]] inline Eight<S> smallest_others(const Eight<S>& a, Eight<S>& all) {
   const Eight<S> one = exchanged<1>(a), pair = smaller(a, one), other_pair = exchanged<2>(pair),
@@ -82,7 +82,7 @@ template <class S>
   return smaller(smaller(one, other_pair), other_four);
 }
 
-/// Half the surface of a box whose sides have these negated lengths. Both signs cancel.
+/// Half the surface of a box whose sides have these negated lengths: the signs cancel.
 template <class T>
 [[gnu::always_inline]] inline T half_surface(T x, T y, T z) {
   return x * y + y * z + z * x;
@@ -151,7 +151,7 @@ void box(const S* rows, S* box) {
   }
 }
 
-/// Computes the box of a node's children with another box in place of one.
+/// Computes the box of a node's children, one of which is replaced by another box.
 template <class S>
 [[gnu::always_inline]] inline Sides<S> with_other(const S* rows, std::uint32_t lane, const Sides<S>& other) {
   Sides<S> result;
@@ -165,14 +165,14 @@ template <class S>
   return result;
 }
 
-/// One search: the moved box, and what is known of the best place.
+/// One search: the moved box, and the best place found so far.
 template <class S>
 struct Search {
   ReinsertionSearch<S>& job;
   const WideArrays<S> tree;
   Sides<S> moved;
-  S surface;  // half that of the moved box
-  S saved;    // by taking it out, below the node that is searched from
+  S surface;  // half the surface of the moved box
+  S saved;    // surface saved by taking it out, below the node where the search starts
   S best;     // gain so far
   std::size_t depth = 0;
 
@@ -184,8 +184,8 @@ struct Search {
     }
   }
 
-  /// Compares the children of a node, but one, and opens those that may lie above a better place; the nearest
-  /// comes last, to be searched first.
+  /// Compares the children of a node, except one, and opens those that may lie above a better place; the
+  /// nearest comes last, and is searched first.
   void look_at(std::uint32_t index, S path, std::uint32_t but) {
     ++job.visits;
     const WideNode node = tree.nodes[index];
@@ -213,7 +213,7 @@ struct Search {
     }
   }
 
-  /// Searches everything below the children of a node, but one.
+  /// Searches everything below the children of a node, except one.
   void below(std::uint32_t index, std::uint32_t but) {
     look_at(index, 0, but);
     while (depth != 0) {
@@ -259,7 +259,7 @@ void search(ReinsertionSearch<S>& job) {
       if (tree.nodes[above].count < 8)
         s.consider(job.lane_price * surface, above, ReinsertionSearch<S>::into);
       if (path != job.node || tree.nodes[path].count > 2)
-        s.consider(own_path * (1 + 2 * job.lane_price), above, lane);  // beside what it leaves
+        s.consider(own_path * (1 + 2 * job.lane_price), above, lane);  // next to the siblings that it leaves
       s.below(above, lane);
     }
     rest = with_other(rows_of(tree, above), lane, rest);

@@ -9,7 +9,7 @@ namespace kbvh {
 
 enum class KernelSet : std::uint8_t;
 
-/// The 8-wide tree of which subtrees are moved: child nodes lie in blocks of 8 numbers, one parent for each
+/// The 8-wide tree in which subtrees are moved: child nodes lie in blocks of 8 numbers, one parent for each
 /// block. Node 0 is the root.
 template <class S>
 struct ReinsertionTree {
@@ -20,13 +20,13 @@ struct ReinsertionTree {
 /// A node that is still to be searched.
 template <class S>
 struct ReinsertionOpen {
-  S path;     ///< by how much the nodes above, and this one, grow
-  S surface;  ///< half that of the node, grown
+  S path;     ///< growth of the nodes above and of this node
+  S surface;  ///< half the surface of the grown node
   std::uint32_t node;
 };
 
-/// The search of the best place for one child of one node, with its whole subtree (Meister & Bittner 2018,
-/// section 3.2, for wide nodes). The cost of a tree is the sum over its nodes of half their surface, and of
+/// A search for the best place for one child of a node, with its whole subtree (Meister & Bittner 2018,
+/// section 3.2, for wide nodes). The cost of a tree is the sum of half the surfaces of its nodes, and of
 /// `lane_price` times as much for each child.
 template <class S>
 struct ReinsertionSearch {
@@ -37,22 +37,21 @@ struct ReinsertionSearch {
   S least;                    ///< smallest gain that counts, in half surfaces of the node
   std::uint32_t most_visits;  ///< nodes whose children are compared
   ReinsertionOpen<S>* stack;  ///< room for 8 entries per level of the tree
-  // The child, which is not the only one, nor one of two of the root:
+  // The child; it is not an only child, nor one of the root's only two:
   std::uint32_t node, lane;
   // The result:
   S gain;                             ///< 0: no place is better
-  std::uint32_t target, target_lane;  ///< beside that child, as the two children of a new node; or `into`
+  std::uint32_t target, target_lane;  ///< next to that child, both children of a new node; or `into`
   std::uint32_t visits;
 };
 
 template <class S>
 struct ReinsertionKernels {
   void (*search)(ReinsertionSearch<S>& job);
-  /// Writes by how much the half surface of a node shrinks if one of its children is taken out: for each
-  /// child.
+  /// Writes, for each child of a node, how much the half surface of the node shrinks without that child.
   void (*gains)(const WideArrays<S>& tree, std::uint32_t node, S* gains);
-  /// Writes for each of some nodes by how much its half surface exceeds that in `settled`: 0 where it does
-  /// not exceed it by the factor `growth`. Returns the sum of the half surfaces.
+  /// Writes, for each of some nodes, how much its half surface exceeds that in `settled`: 0 where it does not
+  /// exceed it by the factor `growth`. Returns the sum of the half surfaces.
   double (*growths)(const WideArrays<S>& tree, const std::uint32_t* nodes, std::uint32_t count,
                     const S* settled, S growth, S* scores);
   /// Computes the box of a node from the rows of its children, as [8]: lower x, y, z, unused, upper x, y, z,

@@ -34,7 +34,7 @@ template <class S, std::size_t padded, class V>
 }
 
 /// Combines the numbers of a row, each half with the other; the order does not depend on the instruction set.
-/// Registers are spelled out: compilers leave loops of this kind as they are.
+/// Registers are written out, because compilers do not vectorise loops of this kind.
 template <class S, std::size_t count, class Combine>
 [[gnu::always_inline]] inline S reduced(const S* row, const Combine& combine) {
   if constexpr (count == 1) {
@@ -73,9 +73,9 @@ template <class S, std::size_t padded>
   }
 }
 
-/// Writes the direction of the slab: the sum of the normals of the first `count` triangles, or zero, which
-/// separates nothing, where that is too small or too large to be scaled. The other triangles repeat the last
-/// one.
+/// Writes the direction of the slab: the sum of the normals of the first `count` triangles. Writes zero,
+/// which separates nothing, if the sum is too small or too large to be scaled. The other triangles repeat the
+/// last one.
 template <class S, std::size_t padded>
 [[gnu::always_inline]] inline void find_direction(const S (&normals)[3][padded], std::uint32_t count,
                                                   S* direction) {
@@ -162,7 +162,7 @@ template <class S, std::size_t padded>
   return reduced<S, padded>(most, larger_lanes);
 }
 
-/// Returns a mask. Bit i: triangle i may reach into the slab, or a number on the way is not finite.
+/// Returns a mask. Bit i: triangle i may reach into the slab, or an intermediate result is not finite.
 template <class S, std::size_t padded>
 [[gnu::always_inline]] inline unsigned meeting_slab(const S* corners, const Slab<S>& slab) {
   using V = Vector<S, block_lanes<S, padded>>;

@@ -24,7 +24,7 @@ struct SpanLeaf {
 
 template <class S, std::size_t padded>
 [[gnu::noinline]] void make_slab(const SpanLeaf<S>& leaf, SpanSlab<S>& slab) {
-  // The mean direction of both ends; they are normalised, and opposite ones separate nothing.
+  // The mean direction of both ends; they are normalised, and opposite directions separate nothing.
   for (std::size_t axis = 0; axis < 3; ++axis)
     slab.direction[axis] = S(0.5) * (leaf.blocks[0][SpanBlock::rows * padded + axis] +
                                      leaf.blocks[1][SpanBlock::rows * padded + axis]);
@@ -56,7 +56,7 @@ void make_spans(const SlabSpanLeaves<S>& leaves, const std::uint32_t* list, std:
   for (std::size_t i = 0; i < count; ++i) make_span<S, padded>(leaves, list[i]);
 }
 
-/// Computes what is not current of a leaf.
+/// Computes the parts of a leaf that are not current.
 template <class S, std::size_t padded>
 [[gnu::always_inline]] inline SpanLeaf<S> span_leaf(const SlabSpanLeaves<S>& leaves, std::uint32_t leaf) {
   if (leaves.slab_stamps[leaf] != leaves.slab_stamp) {
@@ -66,7 +66,7 @@ template <class S, std::size_t padded>
   return span_of<S, padded>(leaves, leaf);
 }
 
-/// Returns a mask. Bit i: triangle i is not certain to stay on one side of the slab.
+/// Returns a mask. Bit i: triangle i may leave one side of the slab.
 template <class S, std::size_t padded>
 [[gnu::always_inline]] inline unsigned meeting_slab(const SpanLeaf<S>& leaf, const SpanSlab<S>& slab,
                                                     S slack) {

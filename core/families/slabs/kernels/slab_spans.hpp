@@ -37,19 +37,19 @@ struct SlabSpanLeaves {
   std::uint32_t slab_stamp;    ///< of the segment
 };
 
-/// Leaves out the pairs of leaves of which a slab separates the triangles throughout the segment. A slab has
-/// a constant direction, and along it the gap between two sets of points in linear motion is concave in
-/// time: what is apart, on the same side, at both ends is apart in between.
+/// Leaves out the pairs of leaves whose triangles a slab separates throughout the segment. A slab has a
+/// constant direction. Along it the gap between two sets of points in linear motion is concave in time: sets
+/// that are apart, on the same side, at both ends are apart in between.
 template <class S>
 struct SlabSpanPairs {
   WideArrays<S> a, b;
   SlabSpanLeaves<S> leaves_a, leaves_b;
-  /// Bounds the rounding of a product, and the distance of positions from the lines, over a leaf's largest
-  /// coordinate.
+  /// Bounds the rounding of a product, and the distance of positions from the lines, relative to a leaf's
+  /// largest coordinate.
   S rounding;
-  LeafSlot* pairs;  ///< first, second, ...; replaced by those that are left
+  LeafSlot* pairs;  ///< first, second, ...; replaced by the remaining ones
   std::size_t count;
-  /// Of the pairs that are left: bit i, triangle i of the first leaf may meet the second leaf; bit 16 + i,
+  /// For the remaining pairs: bit i, triangle i of the first leaf may meet the second leaf; bit 16 + i,
   /// triangle i of the second.
   std::uint32_t* masks;
   std::uint64_t tests;
@@ -59,8 +59,8 @@ template <class S>
 struct SlabSpanKernels {
   /// Filters; computes the blocks and slabs that are not current.
   using Filter = void (*)(SlabSpanPairs<S>& state);
-  /// Computes the slabs of a list of leaves, and their blocks unless they are current. Stamps slabs only by
-  /// the caller: several threads may make different leaves.
+  /// Computes the slabs of a list of leaves, and their blocks unless they are current. The caller stamps the
+  /// slabs: several threads may make different leaves.
   using Make = void (*)(const SlabSpanLeaves<S>& leaves, const std::uint32_t* list, std::size_t count);
   Filter padded_filter[3];  ///< [padded leaf size 4, 8, 16]
   Make padded_make[3];

@@ -65,7 +65,7 @@ template <class S, std::size_t padded>
   return {{tail[0], tail[1], tail[2]}, tail[3] - slack, tail[4] + slack};
 }
 
-/// Returns the slab around one triangle. Where products could overflow, it holds everything.
+/// Returns the slab around one triangle. If products could overflow, it contains everything.
 template <class S, std::size_t padded>
 [[gnu::always_inline]] inline Slab<S> plane_of(const S* block, std::size_t i, S slack) {
   constexpr S most = sizeof(S) == 4 ? S(0x1p96) : S(0x1p960),
@@ -111,7 +111,7 @@ void slab_pairs(SlabLeafPairs<S>& shared) {
     }
     state.tests += count_a + std::uint64_t(unsigned(__builtin_popcount(first))) * count_b;
     alignas(64) std::uint32_t entries_b[16];
-    for (std::size_t i = 0; i < 16; ++i)  // behind a leaf's last entry there may be no memory
+    for (std::size_t i = 0; i < 16; ++i)  // memory may end after a leaf's last entry
       entries_b[i] = lists_b.primitives[begin_b + (i < count_b ? i : 0)];
     for (; first != 0; first &= first - 1) {
       const std::uint32_t i = lowest(first), primitive_a = lists_a.primitives[begin_a + i];

@@ -12,9 +12,9 @@ enum class KernelSet : std::uint8_t;
 /// A leaf of triangles as a block of rows of `padded` lanes, one triangle per lane: six rows of boxes like
 /// those of a node; nine rows of coordinates (corner 0 x, y, z, corner 1 x, ...); three rows of normals, with
 /// the smallest and the largest product of a triangle's normal and its corners, and the sum of the normal's
-/// absolute components; and behind the rows the slab: a direction whose absolute components add up to about
-/// 1, the smallest and the largest product of it and a corner, and the largest coordinate. Lanes behind the
-/// last triangle have empty boxes and repeat its other numbers.
+/// absolute components. The slab follows the rows: a direction whose absolute components add up to about 1,
+/// the smallest and the largest product of it and a corner, and the largest coordinate. Lanes after the last
+/// triangle have empty boxes and repeat its other numbers.
 struct SlabBlock {
   static constexpr std::size_t corner_row = 6, normal_row = 15, low_row = 18, high_row = 19, size_row = 20;
   static constexpr std::size_t rows = 21, tail = 16;
@@ -31,20 +31,20 @@ struct SlabLeaves {
   const S* positions;
 };
 
-/// Turns pairs of leaves into pairs of triangles whose boxes overlap, and of which each meets the slab of the
-/// other one's leaf, and the second one the plane of the first one.
+/// Turns pairs of leaves into pairs of triangles whose boxes overlap, if each triangle meets the slab of the
+/// other's leaf, and the second one meets the plane of the first.
 template <class S>
 struct SlabLeafPairs {
   WideArrays<S> a, b;
   SlabLeaves<S> leaves_a, leaves_b;
-  /// Bounds the rounding of a product of a direction and a corner, over the leaf's largest coordinate.
+  /// Bounds the rounding of a product of a direction and a corner, relative to the leaf's largest coordinate.
   S rounding;
   const LeafSlot* pairs;  ///< first, second, ...
   std::size_t next, count;
   std::uint32_t *primitives_a, *primitives_b;  ///< found pairs in columns
   std::size_t found, room;
   std::uint64_t tests;      ///< of boxes
-  std::uint64_t separated;  ///< pairs of leaves of which a slab has left nothing
+  std::uint64_t separated;  ///< pairs of leaves that a slab separates completely
 };
 /// The space that one pair of leaves may write, in pairs: 256 and a register.
 inline constexpr std::size_t slab_pair_step = 256 + 16;

@@ -26,7 +26,7 @@ void sweep(SweepJob<S>& shared) {
     const SixSides<S> box = lane_box(a.rows + own_block * block_scalars, sweep_block, lane);
     if (job.block == SweepJob<S>::no_block) {
       if (!within_one && !meet(box, all_of_b)) continue;
-      // Lower sides ascend, so what ends before this box begins is not needed again.
+      // Lower sides ascend, so boxes that end before this one begins are not needed again.
       while (!within_one && b.reach[job.first_block] < box.lower[job.axis]) ++job.first_block;
       job.block = within_one ? own_block : job.first_block;
     }

@@ -37,11 +37,11 @@ struct SweepJob {
 
 template <class S>
 struct SweepKernels {
-  /// Continues until all boxes of a are done, or `out` might not have room for the next block.
-  /// A box of a is compared with all boxes of b from the first that reaches it to the last that does not
-  /// begin behind it.
+  /// Continues until all boxes of a are done, or `out` might not have room for the next block. A box of a is
+  /// compared with the boxes of b from the first one that reaches it to the last one that begins before its
+  /// end.
   void (*two)(SweepJob<S>& job);
-  /// The same for a body and itself: each two different boxes once.
+  /// Does the same for a body and itself: each two different boxes once.
   void (*one)(SweepJob<S>& job);
 };
 KBVH_DECLARE_KERNELS(SweepKernels<float>, sweep_float)

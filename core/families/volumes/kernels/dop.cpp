@@ -6,8 +6,7 @@
 namespace kbvh {
 namespace {
 
-/// The lanes of a vector that runs over `count` sides: as many as there are registers for and as divide the
-/// count.
+/// The lanes of a vector that processes `count` sides: as many as fit into a register and divide the count.
 template <class S, std::size_t count>
 constexpr std::size_t lanes_over = [] {
   std::size_t lanes = native_lanes<S>;
@@ -82,7 +81,7 @@ void refit(const DopRefit<S>& job) {
   }
 }
 
-/// Returns bits of the slabs, of `lanes` in a row, in which b lies wholly below a.
+/// Returns bits of the slabs, among `lanes` consecutive ones, in which b lies entirely below a.
 template <class S, std::size_t lanes>
 [[gnu::always_inline]] inline unsigned apart(const S* negated_lower_a, const S* upper_b) {
   using V = Vector<S, lanes>;

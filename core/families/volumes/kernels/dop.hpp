@@ -30,7 +30,7 @@ struct DopRefit {
   const std::uint32_t* points;  ///< of the leaves
   const S* positions;           ///< [point][3]
   const S* directions;          ///< [3][slabs]: components along x, y, z, each -1, 0 or 1
-  const S* margins;             ///< [slabs]: by which both sides of a leaf are moved outwards
+  const S* margins;             ///< [slabs]: margin by which both sides of a leaf move outwards
   S* sides;                     ///< [node][padded sides]
 };
 

@@ -5,7 +5,7 @@
 namespace kbvh {
 namespace {
 
-/// A register of at most `most` lanes, or a plain number: there are no registers of less than 16 bytes.
+/// A register of at most `most` lanes, or a plain number: no register is shorter than 16 bytes.
 template <class S, std::size_t most>
 constexpr std::size_t lanes_up_to = [] {
   const std::size_t lanes = native_lanes<S> < most ? native_lanes<S> : most;
@@ -79,8 +79,8 @@ void load_points(const std::uint32_t* points, std::size_t count, const S* positi
   }
 }
 
-/// Calls step(i, V{}) for numbers [begin, end) in vectors; the last may overlap others. For operations that
-/// may see a number twice.
+/// Calls step(i, V{}) for numbers [begin, end) in vectors; the last one may overlap others. For operations
+/// that may process a number twice.
 template <class S, class Step>
 [[gnu::always_inline]] inline void in_vectors(std::size_t begin, std::size_t end, Step&& step) {
   constexpr std::size_t wide = lanes_up_to<S, 16>, narrow = lanes_up_to<S, 4>;

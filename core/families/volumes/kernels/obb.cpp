@@ -2,7 +2,7 @@
 // rounding.
 //
 // Axes are orthonormal up to 16 u: their pairwise products differ by at most that from 0 and 1. A box is the
-// set of centre + sum of u_i axis_i with |u_i| <= half_i, and also lies, with the points below, within
+// set of centre + sum of u_i axis_i with |u_i| <= half_i. The box and the points below also lie within
 // |axis_i . (p - centre)| <= half_i: the halves are enlarged for both (`half_margin`).
 #include "core/families/volumes/kernels/obb.hpp"
 
@@ -14,27 +14,27 @@ namespace {
 
 template <class S>
 constexpr S unit = sizeof(S) == 4 ? S(0x1p-24) : S(0x1p-53);
-/// Squared lengths between these numbers have all their digits.
+/// Squared lengths between these numbers have their full precision.
 template <class S>
 constexpr S tiny = sizeof(S) == 4 ? S(0x1p-100) : S(0x1p-900);
 template <class S>
 constexpr S huge = sizeof(S) == 4 ? S(0x1p120) : S(0x1p1000);
-/// More than many products lose by underflow.
+/// More than the underflow of many products can lose.
 template <class S>
 constexpr S loss = sizeof(S) == 4 ? S(0x1p-140) : S(0x1p-1060);
 
-/// Over the sum m of the furthest extents from the first point. Along an axis, a point's extent has an error
-/// of 4.2 u m; the centre, of 6 u m, and that of its coordinates (below); the axes' deviation from right
-/// angles counts twice, with up to 16 u m each, and once more for the box as a sum of axes (2 * 18 u m).
-/// Rounded up.
+/// Relative to the sum m of the furthest extents from the first point. Along an axis, a point's extent has an
+/// error of 4.2 u m; the centre, of 6 u m, and the error of its coordinates (below). The axes' deviation from
+/// right angles counts twice, with up to 16 u m each, and once more for the box as a sum of axes (2 * 18 u
+/// m). Rounded up.
 template <class S>
 constexpr S half_margin = 96 * unit<S>;
-/// Over the sum of the centre's coordinates, each rounded once.
+/// Relative to the sum of the centre's coordinates, each rounded once.
 template <class S>
 constexpr S centre_margin = 4 * unit<S>;
-/// Of a separating axis, over the distance of the centres (as a sum of coordinates) and the sum of all
-/// halves: the axes are within 32 u of exact right angles, which counts at most 10 times, and products of
-/// products have up to 40 roundings more.
+/// For a separating axis, relative to the distance of the centres (as a sum of coordinates) and the sum of
+/// all halves: the axes are within 32 u of exact right angles, which counts at most 10 times, and products of
+/// products add up to 40 roundings.
 template <class S>
 constexpr S axis_margin = 512 * unit<S>;
 
@@ -78,7 +78,7 @@ template <class S>
         either((edge_square > tiny<S>)&(edge_square < huge<S>),
                Three<V>{edge.x / edge_length, edge.y / edge_length, edge.z / edge_length}, x_axis);
     const auto across = [&](const Three<V>& way) { return minus(way, scaled(first, product(way, first))); };
-    // Two more points in line leave the second axis open.
+    // If the three points are in line, the second axis is undetermined.
     const Three<V> side = minus(load_three<V>(points + 48 + lane, 8), from);
     const V side_square = product(side, side);
     const Three<V> found = across(side);
@@ -163,7 +163,7 @@ template <class S>
   }
 }
 
-/// Adds points [begin, end) of coordinates in three rows.
+/// Extends over points [begin, end) of coordinates in three rows.
 template <class S>
 [[gnu::always_inline]] inline void add_points(const S* x, const S* y, const S* z, std::size_t begin,
                                               std::size_t end, const Three<S> (&axes)[3],
@@ -255,8 +255,8 @@ template <class S>
   return box;
 }
 
-/// Returns bits of those of `lanes` boxes, in rows, that one of 15 axes separates from a box (Gottschalk, Lin
-/// and Manocha 1996).
+/// Returns bits of those among `lanes` boxes, in rows, that one of 15 axes separates from a box (Gottschalk,
+/// Lin and Manocha 1996).
 template <class S, class V>
 [[gnu::always_inline]] inline unsigned apart(const S* rows, std::size_t stride, const Oriented<S>& box,
                                              unsigned all) {

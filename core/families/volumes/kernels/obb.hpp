@@ -7,7 +7,8 @@
 
 namespace kbvh {
 
-/// The numbers of an oriented box: centre, three axes, half extents along them; boxes of nodes take one more.
+/// The numbers of an oriented box: centre, three axes, and the half extents along them; boxes of nodes have
+/// one more.
 inline constexpr std::size_t obb_rows = 15, obb_own = 16;
 
 /// Oriented boxes of one tree, computed from points: each contains the points below its node. A node's rows

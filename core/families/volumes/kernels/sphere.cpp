@@ -9,8 +9,8 @@ namespace {
 
 template <class S>
 constexpr S unit = sizeof(S) == 4 ? S(0x1p-24) : S(0x1p-53);
-/// A squared distance has 5 roundings of its value (a difference counts twice), its root 3.5, its product
-/// with this number 1 more.
+/// The relative error of a squared distance is 5 roundings (a difference counts twice), of its root 3.5, and
+/// of the product with this number 1 more.
 template <class S>
 constexpr S upward = S(1) + 8 * unit<S>;
 /// A sum of a radius and an upper bound: one rounding, and one for this product.
@@ -24,7 +24,8 @@ template <class S, class V>
 
 enum class Reach { wrapped, layered };
 
-/// The leaves of a node: rows of their spheres, and the box around all. Their points remain in the scratch.
+/// Fits the leaves of a node: the rows of their spheres, and the box around all. Their points remain in the
+/// scratch.
 template <class S>
 [[gnu::always_inline]] inline void fit_leaves(const SphereRefit<S>& job, const WideNode& node, S* rows,
                                               S* box) {
@@ -67,7 +68,7 @@ template <class S>
   }
 }
 
-/// The radius around a centre that reaches to all points of a node's leaves, which the scratch holds.
+/// Returns the radius around a centre that reaches all points of a node's leaves, which the scratch holds.
 template <class S>
 [[gnu::always_inline]] inline S radius_of_leaves(const SphereRefit<S>& job, const WideNode& node,
                                                  const S* centre) {
@@ -83,7 +84,7 @@ template <class S>
   return root_of(largest_of<S>(most)) * upward<S> + job.least;
 }
 
-/// The same for all points below a node, from the rows of coordinates.
+/// Does the same for all points below a node, from the rows of coordinates.
 template <class S>
 [[gnu::always_inline]] inline S radius_of_points(const SphereRefit<S>& job, std::uint32_t node,
                                                  const S* centre) {
@@ -105,7 +106,8 @@ template <class S>
   return root_of(most) * upward<S> + job.least;
 }
 
-/// The radius that reaches to all children's spheres, but not beyond the furthest corner of the node's box.
+/// Returns the radius that reaches all children's spheres, but not beyond the furthest corner of the node's
+/// box.
 template <class S>
 [[gnu::always_inline]] inline S radius_of_children(const SphereRefit<S>& job, const S* rows, const S* box,
                                                    const S* centre) {
@@ -158,8 +160,8 @@ template <class S, Reach reach>
 void refit(const SphereRefit<S>& job) {
   if constexpr (reach == Reach::wrapped)
     load_points<S>(job.points, job.point_count, job.positions, job.coordinates);
-  // Nodes of leaves only first, in ascending order, which suits the prefetcher; then the others, children
-  // before parents.
+  // Nodes with leaves only come first, in ascending order, which suits the prefetcher; then the others,
+  // children before parents.
   for (std::uint32_t i = 0; i < job.node_count; ++i)
     if (job.nodes[i].leaf_count == job.nodes[i].count) fit_node<S, reach>(job, i);
   for (std::uint32_t i = job.node_count; i-- > 0;)
@@ -170,8 +172,8 @@ template <class S>
 struct Ball {
   S x, y, z, radius;
 };
-/// Over the square of two radii: 5 roundings of the squared distance, 3 of the squared sum, 2 of the
-/// comparison. Squares lose less than the absolute number by underflow; where they overflow, spheres overlap.
+/// Relative to the square of two radii: 5 roundings of the squared distance, 3 of the squared sum, 2 of the
+/// comparison. Underflow of squares loses less than the absolute number; if they overflow, spheres overlap.
 template <class S>
 constexpr S square_margin = S(1) + 16 * unit<S>;
 template <class S>

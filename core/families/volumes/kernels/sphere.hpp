@@ -19,8 +19,8 @@ struct SphereRefit {
   S* rows;                     ///< [node][4][8]
   S* own;                      ///< [node][4]: the node's own sphere
   S* boxes;                    ///< [node][8]: its own box, lower x, y, z, unused, upper x, y, z, unused
-  S least;                     ///< by which radii are enlarged: more than squares can lose by underflow
-  // Of spheres that bound the points below a node:
+  S least;                     ///< added to radii: more than squares can lose by underflow
+  // For spheres that bound the points below a node:
   const std::uint32_t* points;  ///< times 3, a multiple of eight of them
   std::size_t point_count;
   const std::uint32_t* ranges;  ///< [node][2]: begin and end of the points below
@@ -38,7 +38,8 @@ template <class S>
 struct SphereKernels {
   /// Centres are those of the boxes around the points below. Squares must not overflow.
   /// `wrapped`: a node's sphere reaches to the furthest point below.
-  /// `layered`: it reaches as far as the furthest sphere of a child, or as the box, whichever is less.
+  /// `layered`: it reaches the furthest sphere of a child or the furthest corner of the box, whichever is
+  /// less.
   void (*wrapped)(const SphereRefit<S>& job);
   void (*layered)(const SphereRefit<S>& job);
   /// Continues a traversal (WideTraversal); `within`: of a tree with itself.

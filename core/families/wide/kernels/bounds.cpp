@@ -5,8 +5,8 @@
 namespace kbvh {
 namespace {
 
-/// Smallest and largest of three registers of coordinates, x, y, z, x, y, z, ... in memory order: as many
-/// vertices at a time as a register has lanes, without gathers.
+/// Smallest and largest of three registers of coordinates, x, y, z, x, y, z, ... in memory order. Processes
+/// as many vertices at a time as a register has lanes, without gathers.
 template <class S>
 struct Stride {
   static constexpr std::size_t lanes = native_lanes<S>;
@@ -48,7 +48,7 @@ void of_runs(const VertexRun* runs, std::size_t count, const S* positions, S* bo
     }
     std::size_t i = 0;
     for (; i + lanes <= n; i += lanes) all.take(at + 3 * i);
-    if (i != n) all.take(at + 3 * (n - lanes));  // the last ones once more
+    if (i != n) all.take(at + 3 * (n - lanes));  // the last ones again
   }
   P::store_smallest(box, lower);
   P::store_largest(box + 4, upper);

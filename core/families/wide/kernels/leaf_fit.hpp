@@ -15,7 +15,7 @@ template <class S, std::size_t padded>
   for (std::uint32_t quad = 0; quad < padded; quad += 4) {
     Pack lower[4], upper[4];
     for (std::uint32_t j = 0; j < 4; ++j) {
-      // Repeats the last primitive beyond the end; those lanes are emptied below.
+      // Repeats the last primitive past the end; those lanes are emptied below.
       const std::uint32_t entry = begin + quad + j < end ? begin + quad + j : end - 1;
       std::uint32_t corner = lists.first_corner[entry];
       const std::uint32_t last = lists.first_corner[entry + 1];

@@ -7,7 +7,8 @@ namespace kbvh {
 /// Computes the rows of leaves outside of a query (`WideOverlapKernels` computes them at their first use).
 template <class S>
 struct LeafRowsKernels {
-  /// Computes the rows of the listed leaves, for leaves of up to 4, 8 or 16; leaves stamps as they are.
+  /// Computes the rows of the listed leaves, for leaves of up to 4, 8 or 16 primitives; does not change
+  /// stamps.
   using Fit = void (*)(const WideLeaves<S>& leaves, const std::uint32_t* list, std::size_t count);
   Fit fit_padded[3];
   Fit fit(std::uint32_t padded) const { return fit_padded[padded == 4 ? 0 : padded == 8 ? 1 : 2]; }

@@ -29,8 +29,8 @@ constexpr std::array<S, 2 * width> make_infinite_from() {
 template <class S, std::uint32_t width>
 constexpr std::array<S, 2 * width> infinite_from = make_infinite_from<S, width>();
 
-/// Computes the boxes of the `width` children of a node, from one point each (lower and upper corners, 8
-/// numbers from one child to the next) or from a list of vertices, into the node's rows and its own box.
+/// Computes the boxes of the `width` children of a node into the node's rows and its own box: from one box
+/// each (lower and upper corners, 8 numbers from one child to the next), or from a list of vertices.
 template <class S, std::uint32_t width>
 struct NodeFit {
   using P = Points<S, width == 8 ? 2 : 1>;
@@ -98,12 +98,12 @@ struct NodeFit {
     }
   }
 
-  /// Takes the lists of a node's leaves, the boxes of its nodes, and empty boxes for the other lanes. In
-  /// registers: stores to single lanes of rows that were just written took half the time of a SAH tree's
-  /// refit.
+  /// Takes the lists of a node's leaves, the boxes of its nodes, and empty boxes for the other lanes. Works
+  /// in registers: stores to single lanes of rows that had just been written took half the time of a SAH
+  /// tree's refit.
   [[gnu::always_inline]] inline void from_lists_and_boxes(const WideArrays<S>& h, const WideNode& node,
                                                           const S* positions, S* rows) {
-    // Of lanes from `leaf_count` on, the lower bound becomes infinite, and the upper one minus that.
+    // In lanes from `leaf_count` on, the lower bound becomes infinite, and the upper one minus infinity.
     const S* const least = infinite_from<S, width>.data() + width - node.leaf_count;
     for (std::uint32_t first = 0; first < width; first += per_pass) {
       Pack lower[4], upper[4];
@@ -120,7 +120,7 @@ struct NodeFit {
       take(lower, upper, rows, first);
     }
   }
-  /// Returns the box of a child that is a node, an empty one for any other lane.
+  /// Returns the box of a child that is a node; an empty box for any other lane.
   [[gnu::always_inline]] static const S* child_box(const WideArrays<S>& h, const WideNode& node,
                                                    std::uint32_t lane) {
     const bool is_node = lane >= node.leaf_count && lane < node.count;
@@ -147,7 +147,7 @@ struct NodeFit {
   }
 };
 
-/// Few leaves next to nodes (SAH trees; the last nodes of a level): one box at a time.
+/// For few leaves next to nodes (SAH trees; the last nodes of a level): one box at a time.
 template <class S, std::uint32_t width>
 [[gnu::noinline]] void fit_single(const WideArrays<S>& h, const WideNode& node, const S* positions, S* rows,
                                   S* node_bounds) {

@@ -8,7 +8,8 @@
 namespace kbvh {
 namespace {
 
-/// Calls work(lanes, i) for all of `count` numbers: for as many as a register holds, then one by one.
+/// Calls work(lanes, i) for all of `count` numbers: first for as many as fit into a register, then one by
+/// one.
 template <class S, class Work>
 [[gnu::always_inline]] inline void in_lanes(std::size_t count, const Work& work) {
   constexpr std::size_t lanes = native_lanes<S>;
@@ -39,7 +40,7 @@ void widen(S* values, std::size_t count, S margin) {
 template <std::size_t bytes>
 using Bits = std::conditional_t<bytes == 4, std::uint32_t, std::uint64_t>;
 
-/// Rounds by their bits, which order the magnitudes of numbers: a carry into the exponent is right.
+/// Rounds by bits, which order numbers by magnitude: a carry into the exponent is correct.
 template <class U, bool to_nearest>
 [[gnu::always_inline]] inline void round_bits(U* bits, std::size_t count, unsigned dropped) {
   const U rest = (U(1) << dropped) - 1;
@@ -55,7 +56,7 @@ template <class U, bool to_nearest>
       });
 }
 
-// Aliases are made by memcpy in load_lanes and store_lanes, so that numbers can be read as bits.
+// load_lanes and store_lanes use memcpy, so numbers can be read as bits without aliasing.
 template <class S>
 void nearest(S* values, std::size_t count, unsigned dropped) {
   round_bits<Bits<sizeof(S)>, true>(reinterpret_cast<Bits<sizeof(S)>*>(values), count, dropped);

@@ -8,17 +8,18 @@ namespace kbvh {
 
 enum class KernelSet : std::uint8_t;
 
-/// What approximate refits do to positions and boxes. All sets of instructions compute the same bits.
+/// The approximations of positions and boxes. All sets of instructions compute the same bits.
 template <class S>
 struct ReduceKernels {
   /// Computes out = from + u (to - from) in S, each operation rounded to nearest.
   void (*interpolate)(const S* from, const S* to, S u, S* out, std::size_t count);
-  /// Rounds to the nearest number with `dropped` binary digits less than S has, ties to even; 0 < dropped <
-  /// the digits of S. The range of exponents stays; infinities, too.
+  /// Rounds to the nearest number with `dropped` binary digits fewer than S has, ties to even; 0 < dropped <
+  /// the digits of S. The range of exponents stays; infinities stay, too.
   void (*nearest)(S* values, std::size_t count, unsigned dropped);
-  /// Rounds to the next such number below, or leaves what is one.
+  /// Rounds down to the next such number; leaves such numbers unchanged.
   void (*down)(S* values, std::size_t count, unsigned dropped);
-  /// Subtracts a margin, rounded to nearest: rows of boxes hold lower and -upper sides, which grow by it.
+  /// Subtracts a margin, rounded to nearest. In rows of boxes, which hold lower and -upper sides, boxes grow
+  /// by it.
   void (*widen)(S* values, std::size_t count, S margin);
 };
 KBVH_DECLARE_KERNELS(ReduceKernels<float>, reduce_float)

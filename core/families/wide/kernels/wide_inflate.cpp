@@ -75,7 +75,7 @@ void check_margins(MarginCheck<S>& shared) {
       inflated[axis + 4] = box[axis + 4] + state.margin;
     }
   };
-  // As in the refit: nodes with leaves only in ascending order, the others children first.
+  // As in the refit: nodes with leaves only come first, in ascending order, then the others, children first.
   for (std::uint32_t i = 0; i < state.node_count; ++i) {
     const WideNode& node = h.nodes[i];
     if (node.leaf_count != node.count) continue;

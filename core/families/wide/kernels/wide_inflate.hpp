@@ -6,7 +6,7 @@ namespace kbvh {
 
 enum class KernelSet : std::uint8_t;
 
-/// One check of a hierarchy whose leaf boxes were inflated by a margin: which of them still contain their
+/// A check of a hierarchy whose leaf boxes were inflated by a margin: which boxes still contain their
 /// vertices, with how much room, and which must be recomputed.
 template <class S>
 struct MarginCheck {
@@ -15,8 +15,8 @@ struct MarginCheck {
   const S* positions;    ///< [vertex][3], with one readable number after the last vertex
   std::uint8_t* remade;  ///< [node]: written; 1 if the node's own box was changed
   S margin;              ///< leaf boxes are inflated by this on every side, rounded to nearest
-  /// The leaves of a node stay unchanged if all their sides have room within these limits: their vertices
-  /// moved by at most the difference to the margin. From infinity: none stay.
+  /// The leaves of a node stay unchanged if the room of all their sides is within these limits: their
+  /// vertices moved by at most the difference to the margin. If keep_from is infinite, none stay.
   S keep_from, keep_to;
   /// The smallest room of all leaves after the check: the smallest distance of any side of a stored box from
   /// the vertices in it. Rounded to nearest.

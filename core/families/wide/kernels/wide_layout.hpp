@@ -31,7 +31,7 @@ struct WideArrays {
   const std::uint32_t* vertices;
 };
 
-/// A leaf as its parent node and lane there.
+/// A leaf, given by its parent node and its lane there.
 struct LeafSlot {
   std::uint32_t word;
   [[gnu::always_inline]] static constexpr std::uint32_t of(std::uint32_t node, std::uint32_t lane) {

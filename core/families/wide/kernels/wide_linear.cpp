@@ -13,7 +13,8 @@ template <class V>
   return larger(x, -x);
 }
 
-/// Returns the share of a side's coordinate by which it moves outwards to meet the other body's sides.
+/// Returns the share of a side's coordinate by which it moves outwards to be compared with the other body's
+/// sides.
 template <class S>
 [[gnu::always_inline]] inline S both_roundings(const WideEnds<S>& a, const WideEnds<S>& b) {
   return a.rounding + b.rounding + 4 * unit_rounding<S>;
@@ -23,7 +24,7 @@ template <class S>
   return rounding * magnitude(side) + least_margin<S>;
 }
 
-/// The margin of a side at a fraction, by its coordinate at the start and its way from there to the end.
+/// The margin of a side at a fraction, from its coordinate at the start and its way from there to the end.
 template <class S>
 struct MomentMargin {
   S of_first, of_way;
@@ -44,8 +45,8 @@ void make(const WideMoment<S>& moment, std::uint32_t node) {
   const S* first = moment.ends.child_bounds[0] + node * scalars;
   const S* last = moment.ends.child_bounds[1] + node * scalars;
   S* rows = moment.hierarchy.child_bounds + node * scalars;
-  // Upper bounds are stored negated: smaller is further out in every row. Empty lanes become NaN, which
-  // overlaps nothing either.
+  // Upper bounds are stored negated: smaller is further out in every row. Empty lanes become NaN, which does
+  // not overlap anything either.
   for (std::size_t i = 0; i < scalars; ++i) {
     const S way = last[i] - first[i];
     rows[i] = first[i] + s * way - margin(first[i], way);
@@ -84,8 +85,8 @@ void at(WideMoment<S> a, WideMoment<S> b, WideTraversal& state) {
 
 // ---- A whole segment --------------------------------------------------------------------------------------
 
-/// A box at both ends, in the form to compare rows of the other side with: upper bounds and negated lower
-/// bounds, both inflated by what rounding can do to both sides.
+/// A box at both ends, in the form in which rows of the other side are compared: upper bounds and negated
+/// lower bounds, both inflated by the largest rounding errors of both sides.
 template <class S>
 struct Reach {
   S bound[2][6];
@@ -104,14 +105,14 @@ template <class S>
   return reach;
 }
 
-/// Gaps of a register of boxes to one box at both ends: positive where a side separates them.
+/// The gaps between a register of boxes and one box at both ends: positive where a side separates them.
 template <class S, class V>
 struct Gaps {
   V first[6], last[6];
 };
 
-/// Computes the interval in which no side separates them, for lanes in which every side closes at one end at
-/// least.
+/// Computes the interval in which no side separates the boxes, for lanes in which every side closes at one
+/// end or both.
 template <class S, class V>
 [[gnu::always_inline]] inline void together(const Gaps<S, V>& gaps, V& begin, V& end) {
   begin = V{} + S(0);
@@ -125,7 +126,7 @@ template <class S, class V>
   }
 }
 
-/// An upper bound of all rounding of a fraction, in `together` and in frames alike.
+/// An upper bound of the rounding of a fraction, both in `together` and in frames.
 constexpr float fraction_slack = 0x1p-20f;
 
 /// Returns the bits of the lanes in which no side separates the boxes at the start, or none at the end.
@@ -220,7 +221,7 @@ void join(WideArrays<S> a, WideEnds<S> ends_a, WideArrays<S> b, WideEnds<S> ends
   traverse_pairs(a, b, view, state);
 }
 
-/// Boxes that are linear in time, of which only pairs with a selected side are visited.
+/// Boxes that are linear in time; visits only pairs with a selected side.
 template <class S, std::uint32_t width, bool self>
 struct SelectedView : SegmentView<S, width, self> {
   static constexpr bool selects = true;
@@ -294,7 +295,7 @@ struct LeafRows {
   std::uint32_t count;
 };
 
-/// The data to compare primitives of a leaf with, like `Reach`.
+/// The data that primitives of a leaf are compared with, like `Reach`.
 template <class S, std::size_t padded>
 struct LeafReach {
   alignas(64) S bound[2][6][padded];  ///< by end, side and primitive
@@ -380,8 +381,8 @@ struct PartlyBatch {
   }
 };
 
-/// Processes the pairs of the primitives of two leaves; only primitives with a bit are visited. Branches on
-/// the overlap would cost as much as the comparisons, so only the ends of loops branch.
+/// Processes the pairs of the primitives of two leaves; visits only primitives with a bit. Branches on the
+/// overlap would cost as much as the comparisons, so only the ends of loops branch.
 template <class S, std::size_t padded>
 [[gnu::always_inline]] inline void leaf_pairs(const LeafRows<S>& outer, unsigned bits,
                                               const LeafRows<S>& inner, unsigned inner_bits, S rounding,
@@ -420,7 +421,7 @@ template <class S, std::size_t padded>
   }
 }
 
-// The width is not a template parameter: it only determines the place of leaf boxes, and each copy of this
+// The width is not a template parameter: it determines only the place of leaf boxes, and each copy of this
 // function is large.
 template <class S, std::size_t padded, bool selected>
 void leaf_join(WideLeafJoin<S>& shared) {
@@ -461,7 +462,7 @@ void leaf_join(WideLeafJoin<S>& shared) {
     state.tests += a.count + b.count;
     if (count_a == 0 || count_b == 0) continue;
     if constexpr (selected) {
-      // Selected primitives of a with all of b, then the others of a with the selected ones of b.
+      // Compares selected primitives of a with all of b, then the others of a with the selected ones of b.
       const unsigned selected_a = state.selected_a[number(state.a, slot_a)];
       const unsigned first = near_a & selected_a, rest = near_a & ~selected_a;
       const unsigned second = rest == 0 ? 0 : near_b & state.selected_b[number(state.b, slot_b)];

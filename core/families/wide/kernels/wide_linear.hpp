@@ -8,37 +8,37 @@ namespace kbvh {
 enum class KernelSet : std::uint8_t;
 
 /// Boxes of a wide hierarchy that are linear in time over a segment: child and node bounds as in
-/// `WideArrays`, at its start and at its end. A box at a fraction in between is the interpolation, inflated
-/// by what rounding can do to each of its sides.
+/// `WideArrays`, at its start and at its end. A box at a fraction in between is interpolated and then
+/// inflated by the largest rounding error of each of its sides.
 ///
-/// Let x0 and x1 be a lower side at the ends, the smallest stored positions there, u half an epsilon, and r
-/// `rounding`. The line A of a vertex is at an end off its stored position P by r |P| at most, and x - r |x|
-/// grows with x, so A >= x - r |x| there, and at a fraction f
+/// Let x0 and x1 be a lower side at the ends, which are the smallest stored positions there, u half an
+/// epsilon, and r `rounding`. At an end, the line A of a vertex differs from its stored position P by at most
+/// r |P|, and x - r |x| grows with x. So A >= x - r |x| there, and at a fraction f
 ///   A >= (1 - f) x0 + f x1 - r ((1 - f) |x0| + f |x1|).
 /// The position B of a frame is A rounded to nearest, which is monotone: the same sum, rounded, is no larger
-/// than B. So rounding depends on the two numbers of one side alone, neither on other axes nor on other
-/// boxes. Upper sides are mirror images.
+/// than B. So the rounding depends only on the two numbers of one side, not on other axes or other boxes.
+/// Upper sides are mirror images.
 ///
-/// Two boxes over a segment (`side_margin`): where B of one body is not above B of another one, the rounded
-/// sums of their sides x and y are not, either, and the gap x - y is at most (ra + u)(1 + u) |x| +
-/// (rb + u)(1 + u) |y|, in the mean of both ends. With |x| <= |x - y| + |y| the coordinates of one box
-/// suffice: y moves outwards by c |y|, where c = ra + rb + 2 u, and 2 u more for the rounding of the moved
-/// side and for products of roundings. What is neglected is some u of the gap, and thus of the fraction at
-/// which it closes, which `fraction_slack` covers.
+/// Two boxes over a segment (`side_margin`): if B of one body is not above B of another one, neither are the
+/// rounded sums of their sides x and y, and the gap x - y is at most (ra + u)(1 + u) |x| + (rb + u)(1 + u)
+/// |y|, in the mean of both ends. With |x| <= |x - y| + |y| the coordinates of one box suffice: y moves
+/// outwards by c |y|, where c = ra + rb + 2 u, plus 2 u for the rounding of the moved side and for products
+/// of roundings. This neglects some u of the gap, and thus of the fraction at which it closes, which
+/// `fraction_slack` covers.
 ///
-/// A box at a fraction s (`moment_margin`): the last operation rounds to nearest, as B is rounded, and costs
-/// nothing. The sum before it, x0 + s (x1 - x0), is off by u of the result, by 2 u s |x1 - x0| for difference
-/// and product, and by 3 u s |x1 - x0| for the fraction, of three roundings in double. With r that is
+/// A box at a fraction s (`moment_margin`): the last operation rounds to nearest, like B, and costs nothing.
+/// The sum before it, x0 + s (x1 - x0), has an error of u of the result, of 2 u s |x1 - x0| for difference
+/// and product, and of 3 u s |x1 - x0| for the fraction, which has three roundings in double. With r that is
 /// (r + u) |x0| + (r + 6 u) |x1 - x0|, to which u and 2 u are added for the roundings of the margin.
 template <class S>
 struct WideEnds {
   const S* child_bounds[2];
   const S* node_bounds[2];
-  /// The largest distance of a vertex's line from its stored position at an end, over that coordinate.
+  /// The largest distance of a vertex's line from its stored position at an end, relative to that coordinate.
   S rounding;
 };
-/// Half a unit of rounding, over the number that is rounded; and the smallest normal number, which bounds
-/// what underflow loses.
+/// Half a unit of rounding, relative to the rounded number; and the smallest normal number, which bounds the
+/// loss by underflow.
 template <class S>
 inline constexpr S unit_rounding = sizeof(S) == 4 ? S(0x1p-24) : S(0x1p-53);
 template <class S>
@@ -53,8 +53,8 @@ struct WideMoment {
   S fraction;
 };
 
-/// The lanes that a traversal is restricted to, per node of each hierarchy: bit i: something in or below lane
-/// i is selected. A pair is visited if either side is selected.
+/// The lanes to which a traversal is restricted, per node of each hierarchy: bit i: something in or below
+/// lane i is selected. A pair is visited if either side is selected.
 struct WideSelection {
   const std::uint8_t *a, *b;
 };
@@ -85,7 +85,7 @@ struct JoinColumns {
   std::size_t found, room;
 
   /// Returns whether there is space for a pair of leaves: its possible pairs, the pairs waiting in a
-  /// register, and one register, since registers are written whole.
+  /// register, and one register, because whole registers are written.
   bool has_room() const { return found + leaf_pair_step + 32 <= room; }
 };
 
@@ -112,10 +112,10 @@ template <class S>
 struct WideLinearKernels {
   /// Like WideOverlapKernels::Traverse, with the boxes of one moment.
   using At = void (*)(WideMoment<S> a, WideMoment<S> b, WideTraversal& state);
-  /// The same for boxes that overlap at any time of the segment.
+  /// Does the same for boxes that overlap at any time of the segment.
   using Join = void (*)(WideArrays<S> a, WideEnds<S> ends_a, WideArrays<S> b, WideEnds<S> ends_b,
                         WideTraversal& state);
-  /// The same for pairs with a selected side.
+  /// Does the same for pairs with a selected side.
   using JoinSelected = void (*)(WideArrays<S> a, WideEnds<S> ends_a, WideArrays<S> b, WideEnds<S> ends_b,
                                 WideSelection selection, WideTraversal& state);
   /// Continues until all pairs of leaves are done or the next one might exceed the free space
@@ -128,8 +128,8 @@ struct WideLinearKernels {
   LeafJoin leaf_join_padded[3];                            ///< [padded leaf size 4, 8, 16]
   Make make_width[3];                                      ///< [log2(width) - 1]
   Join self_width[3];                                      ///< [log2(width) - 1]; a hierarchy with itself
-  JoinSelected selected_width[3], selected_self_width[3];  ///< the same for selected pairs
-  LeafJoin leaf_join_selected_padded[3];                   ///< the same; one side of a pair is selected
+  JoinSelected selected_width[3], selected_self_width[3];  ///< for pairs with a selected side
+  LeafJoin leaf_join_selected_padded[3];                   ///< for pairs with a selected side
 
   static constexpr std::size_t index(std::uint32_t width) { return width == 2 ? 0 : width == 4 ? 1 : 2; }
   At at(std::uint32_t width) const { return at_width[index(width)]; }

@@ -41,8 +41,9 @@ template <class S, std::size_t padded>
   return rows;
 }
 
-/// Appends the pairs of one primitive and those of a leaf whose bits are set. Writes four pairs in any case:
-/// how many bits are set changes from call to call, and a loop over them would be mispredicted each time.
+/// Appends the pairs of one primitive and those primitives of a leaf whose bits are set. Always writes four
+/// pairs: the number of set bits changes from call to call, so a loop over them would be mispredicted each
+/// time.
 [[gnu::always_inline]] inline std::size_t emit_pairs(FoundPair pair, const std::uint32_t* primitives_b,
                                                      unsigned bits, FoundPair* out) {
   alignas(64) std::uint32_t packed[16] = {};

@@ -76,7 +76,7 @@ struct WideOverlapKernels {
   /// space.
   using Traverse = void (*)(WideArrays<S> a, WideArrays<S> b, WideTraversal& state);
   /// Continues until all pairs of leaves are done or the next one might exceed the free space. For leaves of
-  /// up to 4, 8 or 16.
+  /// up to 4, 8 or 16 primitives.
   using LeafPairs = void (*)(WideLeafPairs<S>& state);
   Traverse width2, width4, width8;
   /// [log2(width) - 1][padded leaf size 4, 8, 16]

@@ -6,9 +6,9 @@
 namespace kbvh {
 namespace {
 
-/// The parameter at which a ray crosses a plane has three roundings, which keep its sign: the parameters of
-/// two planes may be exchanged only if they differ by less than `grow`, or by less than `least` where they
-/// underflow. Parameters that overflow count as `largest`.
+/// The parameter at which a ray crosses a plane has three roundings, which keep its sign. The parameters of
+/// two planes may be in the wrong order only if they differ by less than `grow`, or by less than `least` if
+/// they underflow. Parameters that overflow count as `largest`.
 template <class S>
 struct Slack;
 template <>
@@ -25,8 +25,8 @@ KBVH_INLINE S reach_of(const WideRay<S>& ray) {
   return ray.limit * Slack<S>::grow + Slack<S>::least;
 }
 
-/// Returns a mask: bit i is set unless the ray certainly misses the box of lane i. Sets where the ray enters.
-/// Comparisons with what is not a number leave the other operand.
+/// Returns a mask: bit i is set unless the ray certainly misses the box of lane i. Stores where the ray
+/// enters. Comparisons with NaN leave the other operand.
 template <class S, std::size_t width>
 KBVH_INLINE unsigned entered(const S* rows, const WideRay<S>& ray, S* near) {
   constexpr std::size_t fit = native_lanes<S> < width ? native_lanes<S> : width;
@@ -62,7 +62,7 @@ std::uint64_t screen(const WideRayBlock<S>& rays, const S* child_bounds, std::ui
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const V direction = load_lanes<V>(rays.direction[axis] + i), exact = 1 / direction;
       origin[axis] = load_lanes<V>(rays.origin[axis] + i);
-      // Too small to be inverted, but not zero: not a number.
+      // Too small to be inverted, but not zero: NaN.
       inverse[axis] = direction == 0 ? exact : exact + (exact - exact);
     }
     const V limit = load_lanes<V>(rays.length + i);
@@ -103,8 +103,8 @@ KBVH_INLINE Values<S> error_bound(Values<S> permanent) {
 }
 
 /// Returns a mask of the triangles that the ray may meet within its limit; rows[c][k] is corner c of triangle
-/// k. The volumes of core/geometry/ray_triangle.cpp with one error bound for the three, which is that of the
-/// largest edges and distances.
+/// k. Uses the volumes of core/geometry/ray_triangle.cpp with one error bound for all three, computed from
+/// the largest edges and distances.
 template <class S>
 KBVH_INLINE unsigned may_meet(const WideRay<S>& ray, const S* const (&rows)[3][lanes<S>]) {
   const Point<S> corner[3] = {load_points(rows[0]), load_points(rows[1]), load_points(rows[2])};
@@ -122,7 +122,7 @@ KBVH_INLINE unsigned may_meet(const WideRay<S>& ray, const S* const (&rows)[3][l
   const Values<S> lowest = smaller(smaller(v0, v1), v2);
   const Values<S> highest = larger(larger(v0, v1), v2);
   Words<S> missed = greater<S>(-lowest, bound) & greater<S>(highest, bound);
-  // Beyond the limit: |height| > limit |slope|, or behind the origin: they have different signs.
+  // Beyond the limit: |height| > limit |slope|; or behind the origin: height and slope have different signs.
   const Point<S> normal = cross(edge[2], edge[0]), magnitude = cross_magnitude(size, size);
   const Values<S> height = dot(normal, to[0]), slope = dot(normal, direction);
   const Values<S> height_bound = error_bound<S>(dot(magnitude, reach)),
@@ -135,7 +135,7 @@ KBVH_INLINE unsigned may_meet(const WideRay<S>& ray, const S* const (&rows)[3][l
   return ~(high_bits<S>(missed) | behind);
 }
 
-/// Decides the primitives of a leaf that the ray may meet. Returns whether the search is over.
+/// Decides the primitives of a leaf that the ray may meet. Returns whether the search has ended.
 template <class S>
 KBVH_INLINE bool decide_leaf(WideRayJob<S>& job, std::uint32_t begin, std::uint32_t end) {
   if (job.offsets == nullptr || end - begin < 2) {
@@ -143,7 +143,7 @@ KBVH_INLINE bool decide_leaf(WideRayJob<S>& job, std::uint32_t begin, std::uint3
       if (job.decide(job.context, job.entries[begin])) return true;
     return false;
   }
-  job.tests += end - begin;  // at once: the same with registers of any width
+  job.tests += end - begin;  // added at once: the same with registers of any width
   for (; begin < end; begin += lanes<S>) {
     const std::uint32_t count = end - begin < lanes<S> ? end - begin : lanes<S>;
     const S* rows[3][lanes<S>];

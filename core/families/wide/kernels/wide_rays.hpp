@@ -8,8 +8,8 @@ namespace kbvh {
 
 enum class KernelSet : std::uint8_t;
 
-/// A ray as the traversal reads it: along each axis it enters a box at (row + add) * scale of one of the six
-/// rows of the children's boxes, and leaves it at (row - add) * -scale of another.
+/// A ray in the form that the traversal reads: along each axis it enters a box at (row + add) * scale of one
+/// of the six rows of the children's boxes, and leaves it at (row - add) * -scale of another.
 template <class S>
 struct WideRay {
   std::uint32_t enter_row[3], leave_row[3];
@@ -37,7 +37,7 @@ struct WideRayJob {
   /// filter.
   const std::uint32_t* offsets;
   const std::uint32_t* vertices;
-  /// [entry][3]: corners of the entries' primitives, times 3; null: found by offsets and vertices.
+  /// [entry][3]: corners of the entries' primitives, times 3; null: they are found by offsets and vertices.
   const std::uint32_t* triangle_corners;
   const S* positions;         ///< [vertex][3], one scalar past the end
   const std::uint8_t* stale;  ///< [node]: not 0 while its children's boxes must be made; null: none
@@ -61,10 +61,10 @@ struct WideRayBlock {
 
 /// Follows rays, nearer children first. Boxes are closed and tested conservatively: an item is left out only
 /// if the ray certainly misses its box within the limit. A filter leaves out primitives of three corners that
-/// the ray certainly misses; all others are decided by the caller.
+/// the ray certainly misses; the caller decides all others.
 template <class S>
 struct WideRayKernels {
-  /// Continues until the stack is empty, the search is over, or a step might exceed the free space.
+  /// Continues until the stack is empty, the search has ended, or a step might exceed the free space.
   using Follow = void (*)(WideRayJob<S>& job);
   Follow width2, width4, width8;
   Follow follow(std::uint32_t width) const { return width == 2 ? width2 : width == 4 ? width4 : width8; }

@@ -26,8 +26,8 @@ constexpr std::size_t lanes_for(std::size_t many) {
   return lanes;
 }
 
-/// Gathers the coordinates at `lanes` places, without a detour through memory where possible: a load of
-/// several numbers waits until all of them have been stored.
+/// Gathers the coordinates at `lanes` places, without a detour through memory if possible: a load of several
+/// numbers must wait until all of them have been stored.
 template <class S, std::size_t lanes>
 [[gnu::always_inline]] inline Vector<S, lanes> gathered(const std::uint32_t* places, const S* positions) {
 #if defined(KBVH_KERNELS_avx2) || defined(KBVH_KERNELS_avx512)
@@ -61,7 +61,7 @@ template <class S, std::uint32_t width>
     V value = gathered<S, lanes>(realisers + i, positions);
     if (i >= 3 * width) value = -value;
     const V bound = load_lanes<V>(rows + i);
-    // Bounds are stored so that smaller is further out. Empty lanes are infinite: nothing is larger.
+    // Bounds are stored so that smaller is further out. Empty lanes are infinite: no coordinate is larger.
     if constexpr (lanes == 1)
       bits |= std::uint64_t(value > bound) << i;
     else

@@ -12,9 +12,9 @@ enum class KernelSet : std::uint8_t;
 template <class S>
 struct WideRealiserKernels {
   /// Computes the boxes of the nodes [begin, end) at `positions`, the last first, into
-  /// `hierarchy.node_bounds`; its `child_bounds` are neither read nor written. `lost[node]`: bit row * width
-  /// + lane is set where the realiser does not realise the side there. Children that are nodes must be
-  /// current or lie in the range, too.
+  /// `hierarchy.node_bounds`; neither reads nor writes its `child_bounds`. `lost[node]`: bit row * width +
+  /// lane is set if the realiser does not realise the side there. Children that are nodes must be current or
+  /// lie in the range, too.
   using Check = void (*)(WideArrays<S> hierarchy, const std::uint32_t* realisers, const S* positions,
                          std::uint64_t* lost, std::uint32_t begin, std::uint32_t end);
   /// Computes values[i] = positions[places[i]].

@@ -23,8 +23,8 @@ void refit(WideArrays<S> h, const S* positions, std::uint32_t begin, std::uint32
   }
 }
 
-/// Fetches what `refit_listed` will read and write of a node: listed nodes lie anywhere, and no prefetcher
-/// of the processor guesses where.
+/// Prefetches what `refit_listed` will read and write for a node: listed nodes lie anywhere, and no hardware
+/// prefetcher guesses where.
 template <class S, std::uint32_t width>
 [[gnu::always_inline]] inline void fetch_ahead(const WideArrays<S>& h, std::uint32_t i) {
   const char* const rows = reinterpret_cast<const char*>(h.child_bounds + std::size_t(i) * 6 * width);

@@ -52,7 +52,7 @@ template <class S, std::size_t width>
   return std::uint32_t(__builtin_ctz(bits));
 }
 
-/// Returns the traversal's name of child `lane`.
+/// Returns how the traversal refers to child `lane`.
 [[gnu::always_inline]] inline std::uint32_t child(const WideNode& node, std::uint32_t index,
                                                   std::uint32_t lane) {
   return lane < node.leaf_count ? WidePair::leaf_bit | LeafSlot::of(index, lane)
@@ -101,7 +101,7 @@ template <class S, class View>
         unsigned second = view.meeting_b(pair.second, view.lane_a(pair.first, i));
         if constexpr (View::selects)
           if ((view.selected_a(pair.first) >> i & 1) == 0) second &= view.selected_b(pair.second);
-        // For a node with itself, the other half mirrors this one.
+        // For a node paired with itself, the other half mirrors this one.
         if (View::within_one && pair.first == pair.second) second &= ~0U << i;
         for (; second != 0; second &= second - 1)
           emit(state, child_a, child(node_b, pair.second, lowest(second)));
