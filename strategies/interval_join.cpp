@@ -15,7 +15,8 @@
 // Boxes linear in time exceed those of a refit by a few roundings of their coordinates. Where gaps and
 // triangles are no larger than these roundings, the join lists far more pairs than a refit finds: nearly all
 // pairs where two sheets of unit size lie 0.1 apart at 1e6 in float, whose numbers are 0.06 apart there.
-// `auto` gives up such a join.
+// `auto` gives up such a join. The same holds for scenes about as small as the smallest normal number (1e-38 in
+// float), by which all margins are larger.
 
 #include <algorithm>
 #include <limits>

@@ -1,24 +1,33 @@
 // The kinetic AABB tree (Z&W 2006, s.4), with the errata of the reproduction: tight at every time, updated at
-// events only.
+// events only. Vertices may move on curves of degree 2 or 3: certificates then compare polynomials.
 
 #include "core/contract/registry.hpp"
+#include "core/families/events/algebraic_clock.hpp"
 #include "core/families/events/any_queue.hpp"
 #include "core/families/events/kinetic_tree_strategy.hpp"
 
 namespace kbvh {
 namespace {
 
+/// In the order of the forests: lines alone, and curves.
 template <class S>
-using OnAnyQueue = ExactKineticAabbStrategy<S, AnyQueue<S>>;
+using OnAnyQueue = ExactKineticAabbStrategy<S, AnyQueue<S>, AnyEventQueue<AlgebraicClock<S>>>;
 
 template <class S>
 class KineticAabb final : public OnAnyQueue<S> {
  public:
   KineticAabb(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
               const Params& params)
-      : OnAnyQueue<S>(scene, motion, std::move(topologies), 0,
+      : OnAnyQueue<S>(scene, motion, std::move(topologies), any_on_curves(scene, motion) ? 1 : 0,
                       params.word("query") == "rows" ? KineticQuery::wide_rows : KineticQuery::node_pairs) {
     this->on_forest([&](auto& forest) { forest.choose_queue(params.word("queue")); });
+  }
+
+ private:
+  static bool any_on_curves(const SceneView<S>& scene, const ClipMotion<S>& motion) {
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body)
+      if (motion.plans(body).curved()) return true;
+    return false;
   }
 };
 
@@ -33,7 +42,7 @@ KBVH_STRATEGY(kinetic_aabb) {
       .family = "kinetic",
       .citation = "Zachmann & Weller 2006, s.4",
       .positions = PositionUse::fetched,
-      .declares = {.continuous = true, .time_budget = true},
+      .declares = {.continuous = true, .time_budget = true, .curves = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
       .parameters = {queue_parameter(),
                      {"query",

@@ -1,5 +1,6 @@
-// Boxes that are linear in time: computed at both ends of each segment in which all flight plans are known to
-// be straight, and interpolated by the query at the nodes that it visits. Frames update nothing. Prior art:
+// Boxes that are linear in time: computed at the ends of each segment in which all flight plans are known to
+// be straight, and interpolated by the query at the nodes that it visits. Frames update nothing. Where
+// vertices move on curves, boxes are larger by as much as a curve may leave its chord. Prior art:
 // core/adr/0010-prior-art-of-answering-intervals.md.
 
 #include "core/families/linear/linear_bounds.hpp"
@@ -116,7 +117,7 @@ KBVH_STRATEGY(linear_bounds) {
           "kbvh; linear boxes of moving triangles as in motion-blur hierarchies (Christensen et al. 2006)",
       .tightness = Tightness::conservative,
       .positions = PositionUse::fetched,
-      .declares = {.continuous = true, .time_budget = true},
+      .declares = {.continuous = true, .time_budget = true, .curves = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
       .parameters = linear_parameters(),
   })};

@@ -15,6 +15,7 @@ length, ids count from 0.
 
 from ._core import ConfigError, InputError, KbvhError
 from . import results
+from .broad_phase import BroadPhase
 from .conformance import Verdict, check, small_scenes
 from .own import BodyView, Parameter, SceneView, Strategy, register
 from .scenes import Body, PlanChange, Scene, builtin_scenes, load, scene, shapes
@@ -24,8 +25,8 @@ from .trees import Tree, overlapping, primitive_bounds, refit
 from .world import Audit, Hierarchy, Step, World, padded
 
 __all__ = [
-    "Audit", "Body", "BodyView", "ConfigError", "Hierarchy", "InputError", "KbvhError", "Parameter", "PlanChange", "Run",
-    "Scene", "SceneView", "Step", "Strategy", "Tree", "Verdict", "World", "builtin_scenes", "check", "counters", "describe", "load",
+    "Audit", "Body", "BodyView", "BroadPhase", "ConfigError", "Hierarchy", "InputError", "KbvhError", "Parameter", "PlanChange", 
+    "Run", "Scene", "SceneView", "Step", "Strategy", "Tree", "Verdict", "World", "builtin_scenes", "check", "counters", "describe", "load",
     "overlapping", "padded", "plan", "primitive_bounds", "refit", "register", "results", "run", "scene", "shapes",
     "small_scenes", "strategies",
 ]  # fmt: skip

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <vector>
 
-#include "core/continuous/algebraic_time.hpp"
 #include "core/continuous/impact.hpp"
+#include "core/motion/algebraic_time.hpp"
 
 namespace kbvh {
 namespace {

@@ -30,8 +30,9 @@ struct ScheduledEvent {
   std::uint32_t winner = no_vertex, loser = no_vertex;  ///< kind bound: `loser` overtakes `winner`
   std::uint32_t other_body = 0, other_node = 0;  ///< boxes_meet, boxes_separate, review: the second box
   TimeEstimate time;                             ///< in seconds; |exact time - time.time| <= time.error
-  bool has_crossing = false;                     ///< whether `crossing` is valid: false for review and window
-  Crossing<S> crossing{};                        ///< the exact time: the crossing of two linear pieces
+  /// Whether `crossing` is valid: false for review and window, and for vertices on curves.
+  bool has_crossing = false;
+  Crossing<S> crossing{};  ///< the exact time: the crossing of two linear pieces
 
   bool operator==(const ScheduledEvent& other) const {
     return kind == other.kind && body == other.body && node == other.node && side == other.side &&
@@ -46,8 +47,10 @@ template <class S>
 struct BoundNotice {
   std::uint32_t body = 0, node = 0, side = 0;
   std::uint32_t old_vertex = no_vertex, new_vertex = no_vertex;
-  double begin = 0;        ///< seconds; not later than the change
-  bool at_event = false;   ///< whether the change happened at `crossing`; else at `begin`
+  double begin = 0;  ///< seconds; not later than the change
+  /// Whether the change happened at `crossing`; else at `begin`, or, on curves, in the segment from `begin`
+  /// on.
+  bool at_event = false;
   Crossing<S> crossing{};  ///< the exact time, if `at_event`
 
   /// Compares the changes; ignores `begin` of a change at an event, which is only a hint.

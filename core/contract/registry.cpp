@@ -71,6 +71,8 @@ std::string unsuitable_bodies(const Info& info, const Scene<S>& scene) {
     if (body.primitives.count() > 0 &&
         std::find(kinds.begin(), kinds.end(), body.primitives.kind) == kinds.end())
       return std::string("does not take ") + name(body.primitives.kind) + ", as in body '" + body.name + "'";
+    if (body.plans.curved() && !info.can.curves)
+      return "foresees linear motion only, but vertices of body '" + body.name + "' move on curves";
     if (body.plans.is_handed_in() && info.foresight != Foresight::none)
       return "needs to know the motion in advance, but the positions of body '" + body.name +
              "' are handed in frame by frame";

@@ -46,7 +46,8 @@ Capabilities capabilities(const Declared& declared) {
           .self_pairs = has<T, AnswersSelfPairs>(),
           .contacts = has<T, AnswersSweeps<S>>(),
           .changes = has<T, AnswersChanges<S>>(),
-          .rays = has<T, AnswersRays<S>>()};
+          .rays = has<T, AnswersRays<S>>(),
+          .curves = declared.curves || T::foresight <= Foresight::step_bound};
 }
 template <template <class> class T, class S>
 std::unique_ptr<Strategy<S>> make(const SceneView<S>& scene, Playback<S>& playback, Topologies topologies,
@@ -101,7 +102,7 @@ BuilderConfig suitable_builder(const Info& info, std::optional<BuildMethod> meth
                                std::optional<std::uint32_t> width, std::optional<std::uint32_t> leaf_size);
 
 /// Returns the reason why the strategy cannot play a scene of these bodies, as the end of a sentence that
-/// begins with its id; empty if it can. Checks pairs within a body, kinds of primitives, positions that are
+/// begins with its id; empty if it can. Checks pairs within a body, kinds of primitives, curves, positions
 /// handed in frame by frame, and the range of keyframes.
 template <class S>
 std::string unsuitable_bodies(const Info& info, const Scene<S>& scene);

@@ -49,6 +49,7 @@ struct Declared {
   bool continuous = false;    ///< bounds are valid between frames, too
   bool restructures = false;  ///< changes its topology at run time
   bool time_budget = false;   ///< honours a query budget
+  bool curves = false;        ///< foresees vertices on curves, not on lines alone
 };
 
 /// The optional abilities of a strategy. The registration fills them in from the class
@@ -65,6 +66,9 @@ struct Capabilities {
   bool contacts = false;  ///< AnswersSweeps: the broad phase of continuous collision detection
   bool changes = false;   ///< AnswersChanges: changes of answers without a comparison of full answers
   bool rays = false;      ///< AnswersRays: hits_at
+  /// Plays scenes whose vertices move on curves (FlightPlans::curved): declared, or implied by a foresight of
+  /// positions and displacement bounds alone.
+  bool curves = false;
 };
 
 /// The topologies that a strategy accepts. A strategy that builds its own hierarchy (a peer library) accepts

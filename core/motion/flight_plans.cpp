@@ -7,6 +7,7 @@
 
 #include "core/motion/admissible.hpp"
 #include "core/motion/error_free.hpp"
+#include "core/motion/round_curve.hpp"
 
 namespace kbvh {
 
@@ -19,10 +20,44 @@ void check_value(S value, const char* what, std::size_t keyframe, std::size_t ve
                               number_text(double(value)) + ", outside the admissible range (" +
                               admissible_text<S>() + ")");
 }
+
+/// Checks the curves of all segments, and removes lists of zeros.
+template <class S>
+void check_bends(std::size_t segments, std::uint32_t vertex_count, std::vector<SegmentBends<S>>& bends) {
+  if (bends.empty()) return;
+  if (bends.size() != segments)
+    throw std::invalid_argument("expected the curves of " + std::to_string(segments) + " segments, got " +
+                                std::to_string(bends.size()));
+  const std::size_t scalars = std::size_t(3) * vertex_count;
+  for (std::size_t k = 0; k < segments; ++k)
+    for (std::vector<S>* values : {&bends[k].twist, &bends[k].bend}) {
+      if (!values->empty() && values->size() != scalars)
+        throw std::invalid_argument("expected " + std::to_string(scalars) +
+                                    " numbers for the curves of segment " + std::to_string(k) + ", got " +
+                                    std::to_string(values->size()));
+      bool zero = true;
+      for (std::size_t i = 0; i < values->size(); ++i) {
+        S& value = (*values)[i];
+        check_value(value, values == &bends[k].bend ? "bend" : "twist", k, i / 3, int(i % 3));
+        if (value == S(0)) value = S(0);
+        zero = zero && value == S(0);
+      }
+      if (zero) values->clear();
+      if (values == &bends[k].bend && values->empty() && !bends[k].twist.empty())
+        values->assign(scalars, S(0));
+    }
+  if (std::all_of(bends.begin(), bends.end(), [](const auto& segment) { return segment.bend.empty(); }))
+    bends.clear();
+}
+
+[[noreturn]] void refuse_change_of_curves() {
+  throw std::invalid_argument("plans of a body whose vertices move on curves cannot change");
+}
 }  // namespace
 
 template <class S>
-FlightPlans<S>::FlightPlans(std::uint32_t vertex_count, std::vector<double> times, std::vector<S> positions)
+FlightPlans<S>::FlightPlans(std::uint32_t vertex_count, std::vector<double> times, std::vector<S> positions,
+                            std::vector<SegmentBends<S>> bends)
     : vertex_count_(vertex_count), keyframed_count_(vertex_count) {
   if (times.empty()) throw std::invalid_argument("flight plans need at least one keyframe");
   for (std::size_t k = 0; k < times.size(); ++k) {
@@ -39,11 +74,21 @@ FlightPlans<S>::FlightPlans(std::uint32_t vertex_count, std::vector<double> time
     check_value(positions[i], "coordinate", point / vertex_count, point % vertex_count, int(i % 3));
     if (positions[i] == S(0)) positions[i] = S(0);  // truth B holds no negative zero
   }
+  check_bends(times.size() - 1, vertex_count, bends);
   // Not at the first request: plans are restored for every play, and frames allocate nothing.
   longest_steps_.assign(times.size(), -1.0);
   translations_.resize(times.size());
   positions.push_back(S(0));  // readers may load four scalars
-  keyframes_ = std::make_shared<const Keyframes>(Keyframes{std::move(times), std::move(positions)});
+  keyframes_ =
+      std::make_shared<const Keyframes>(Keyframes{std::move(times), std::move(positions), std::move(bends)});
+}
+
+template <class S>
+CurvedPiece<S> FlightPlans<S>::curved_piece(std::uint32_t vertex, int axis, std::size_t k) const {
+  const std::size_t at = std::size_t(3) * vertex + std::size_t(axis);
+  const S *const bend = curved() ? bends(k) : nullptr, *const twist = curved() ? twists(k) : nullptr;
+  return {keyframes_->times[k], keyframes_->times[k + 1],          keyframe(k)[at],
+          keyframe(k + 1)[at],  bend == nullptr ? S(0) : bend[at], twist == nullptr ? S(0) : twist[at]};
 }
 
 template <class S>
@@ -66,6 +111,10 @@ void FlightPlans<S>::evaluate_keyframed(double t, std::uint32_t begin, std::uint
                     scalars = std::size_t(3) * (end - begin);
   if (t <= times[k] || k + 1 == times.size())
     std::copy_n(keyframe(k) + first, scalars, out + first);
+  else if (curved_in(k))
+    round_curve(keyframe(k) + first, keyframe(k + 1) + first, bends(k) + first,
+                twists(k) == nullptr ? nullptr : twists(k) + first, scalars, times[k], times[k + 1], t,
+                out + first);
   else
     round_chord(keyframe(k) + first, keyframe(k + 1) + first, scalars, times[k], times[k + 1], t,
                 out + first);
@@ -137,6 +186,9 @@ void FlightPlans<S>::evaluate_listed(double t, std::span<const std::uint32_t> ve
   if (t <= times[k] || k + 1 == times.size()) {
     for (std::uint32_t v : vertices)
       std::copy_n(keyframe(k) + std::size_t(3) * v, 3, out + std::size_t(3) * v);
+  } else if (curved_in(k)) {
+    round_curve_vertices(keyframe(k), keyframe(k + 1), bends(k), twists(k), vertices.data(), vertices.size(),
+                         times[k], times[k + 1], t, out);
   } else {
     round_chord_vertices(keyframe(k), keyframe(k + 1), vertices.data(), vertices.size(), times[k],
                          times[k + 1], t, out);
@@ -172,6 +224,7 @@ Piece<S> FlightPlans<S>::piece_after(std::uint32_t vertex, int axis, double t) c
   if (t < times[0]) return {t, times[0], keyframe(0)[at], S(0), PieceKind::ray};
   if (k + 1 == times.size())
     return {times[k], std::numeric_limits<double>::infinity(), keyframe(k)[at], S(0), PieceKind::ray};
+  if (curved_in(k)) throw std::logic_error("a linear piece is asked for where vertices move on curves");
   return {times[k], times[k + 1], keyframe(k)[at], keyframe(k + 1)[at], PieceKind::chord};
 }
 
@@ -225,47 +278,6 @@ bool FlightPlans<S>::at_rest(double t) const {
 }
 
 template <class S>
-std::optional<Translation<S>> FlightPlans<S>::translation(double t) const {
-  const auto& times = keyframes_->times;
-  if (!own_plans_.empty() || keyframed_count_ == 0 || t < times.front() || t >= times.back()) return {};
-  auto& known = translations_[segment_at(t)];
-  if (!known) known = find_translation(segment_at(t));
-  return *known;
-}
-
-template <class S>
-std::optional<Translation<S>> FlightPlans<S>::find_translation(std::size_t segment) const {
-  constexpr std::size_t block = 3 * 256;
-  constexpr S infinity = std::numeric_limits<S>::infinity(), eps = std::numeric_limits<S>::epsilon();
-  const std::size_t scalars = std::size_t(3) * keyframed_count_;
-  const S *from = keyframe(segment), *to = keyframe(segment + 1);
-  // A stored coordinate is rounded by a share of itself, whatever those of other vertices are.
-  const auto rounding = [&](std::size_t i) { return eps * std::max(std::abs(from[i]), std::abs(to[i])); };
-  const std::array<S, 3> first{to[0] - from[0], to[1] - from[1], to[2] - from[2]};
-  bool exact = true;
-  // The steps that serve all coordinates so far.
-  std::array<S, 3> least{-infinity, -infinity, -infinity}, most{infinity, infinity, infinity};
-  for (std::size_t begin = 0; begin < scalars; begin += block) {
-    for (std::size_t i = begin; i < std::min(begin + block, scalars); i += 3)
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const TwoPart<S> step = two_diff(to[i + axis], from[i + axis]);
-        least[axis] = std::max(least[axis], step.hi - rounding(i + axis));
-        most[axis] = std::min(most[axis], step.hi + rounding(i + axis));
-        exact = exact && step.hi == first[axis] && step.lo == 0;
-      }
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      if (least[axis] > most[axis]) return {};
-  }
-  if (exact) return Translation<S>{first, first, true};
-  std::array<S, 3> step;
-  for (std::size_t axis = 0; axis < 3; ++axis)
-    step[axis] = std::clamp(least[axis] + (most[axis] - least[axis]) / 2, least[axis], most[axis]);
-  for (std::size_t i = 0; i < scalars; ++i)
-    if (std::abs(to[i] - (from[i] + step[i % 3])) > rounding(i)) return {};
-  return Translation<S>{step, step, false};
-}
-
-template <class S>
 Piece<S> FlightPlans<S>::own_piece(const OwnPlan& plan, int axis, double t) const {
   const auto above = std::upper_bound(plan.times.begin(), plan.times.end(), t);
   const std::size_t k = above == plan.times.begin() ? 0 : std::size_t(above - plan.times.begin()) - 1;
@@ -310,6 +322,7 @@ void FlightPlans<S>::check_plan(double t, const PlanChange<S>& change, std::uint
 template <class S>
 void FlightPlans<S>::check_change(double t, const PlanChange<S>& change, const S* position) const {
   check_vertex(change.vertex);
+  if (curved()) refuse_change_of_curves();
   check_plan(t, change, change.vertex, position);
 }
 
@@ -352,6 +365,7 @@ void FlightPlans<S>::check_new_vertex(double t, const PlanChange<S>& plan, const
 
 template <class S>
 void FlightPlans<S>::add_vertex(double t, const PlanChange<S>& plan, const S* position) {
+  if (curved()) refuse_change_of_curves();
   check_plan(t, plan, vertex_count_, position);
   own_speed_until_ = own_speed_from_;  // forces recomputation
   own_of_vertex_.resize(vertex_count_, none);
@@ -361,106 +375,14 @@ void FlightPlans<S>::add_vertex(double t, const PlanChange<S>& plan, const S* po
   join_rays(own_plans_.back());
 }
 
-namespace {
-/// Returns an upper bound of every rounding of the few preceding operations on positive numbers, underflow
-/// included.
-double rounded_up(double value) {
-  return value * (1 + 1e-12) + std::numeric_limits<double>::min();
-}
-}  // namespace
-
-/// Returns the longest step of any vertex in a segment, rounded up; 0 only if no vertex moves.
-template <class S>
-double FlightPlans<S>::longest_step(std::size_t segment) const {
-  double& known = longest_steps_[segment];
-  if (known >= 0) return known;
-  const S *from = keyframe(segment), *to = keyframe(segment + 1);
-  double square = 0, largest = 0;
-  for (std::size_t i = 0; i < std::size_t(3) * keyframed_count_; i += 3) {
-    double sum = 0;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double step = double(to[i + axis]) - double(from[i + axis]);
-      sum += step * step;
-      largest = std::max(largest, std::abs(step));
-    }
-    square = std::max(square, sum);
-  }
-  // Squares of small numbers underflow; the added term covers the loss.
-  known = largest == 0 ? 0 : rounded_up(std::sqrt(square + 1e-300));
-  return known;
-}
-
-/// Returns the speed of the piece that holds at t.
-template <class S>
-double FlightPlans<S>::own_speed(const OwnPlan& plan, double t) const {
-  double step[3], seconds = 1;
-  for (int axis = 0; axis < 3; ++axis) {
-    const Piece<S> piece = own_piece(plan, axis, t);
-    step[axis] = piece.kind == PieceKind::chord ? double(piece.x1) - double(piece.x0) : double(piece.x1);
-    if (piece.kind == PieceKind::chord) seconds = piece.t1 - piece.t0;
-  }
-  if (step[0] == 0 && step[1] == 0 && step[2] == 0) return 0;
-  return rounded_up(std::hypot(step[0], step[1], step[2]) / seconds);
-}
-
-template <class S>
-double FlightPlans<S>::own_speed_bound(double t) const {
-  if (t < own_speed_from_ || t >= own_speed_until_) {
-    own_speed_ = 0;
-    own_speed_from_ = t;
-    own_speed_until_ = std::numeric_limits<double>::infinity();
-    for (const OwnPlan& plan : own_plans_) {
-      own_speed_ = std::max(own_speed_, own_speed(plan, t));
-      own_speed_until_ = std::min(own_speed_until_, piece_end(plan.vertex, t));
-    }
-  }
-  return own_speed_;
-}
-
-template <class S>
-double FlightPlans<S>::speed_bound(double t) const {
-  const auto& times = keyframes_->times;
-  const std::size_t k = segment_at(t);
-  double bound = own_plans_.empty() ? 0 : own_speed_bound(t);
-  if (k + 1 < times.size() && t >= times[0] && longest_step(k) > 0)
-    bound = std::max(bound, rounded_up(longest_step(k) / (times[k + 1] - times[k])));
-  return bound;
-}
-
-template <class S>
-double FlightPlans<S>::displacement_bound(double t0, double t1) const {
-  if (!(t0 < t1)) return 0;
-  const auto& times = keyframes_->times;
-  double common = 0;
-  for (std::size_t k = segment_at(t0); k + 1 < times.size() && times[k] < t1; ++k) {
-    const double begin = std::max(t0, times[k]), end = std::min(t1, times[k + 1]);
-    if (!(begin < end) || longest_step(k) == 0) continue;
-    const double share = (end - begin) / (times[k + 1] - times[k]);
-    common = rounded_up(common + longest_step(k) * std::min(1.0, rounded_up(share)));
-  }
-  if (own_plans_.empty()) return common;
-  double own_bound = own_speed_bound(t0);
-  if (t1 <= own_speed_until_) return std::max(common, own_bound == 0 ? 0 : rounded_up(own_bound * (t1 - t0)));
-  // Some plan has a knot in between: follow each plan along its own pieces.
-  own_bound = 0;
-  for (const OwnPlan& plan : own_plans_) {
-    double way = 0;
-    for (double begin = t0; begin < t1;) {
-      const double end = std::min(t1, piece_end(plan.vertex, begin)), speed = own_speed(plan, begin);
-      if (speed > 0) way = rounded_up(way + speed * (end - begin));
-      begin = end;
-    }
-    own_bound = std::max(own_bound, way);
-  }
-  return std::max(common, own_bound);
-}
-
 template <class S>
 std::size_t FlightPlans<S>::bytes() const {
   std::size_t total = keyframes_->times.size() * sizeof(double) + keyframes_->positions.size() * sizeof(S) +
                       longest_steps_.size() * sizeof(double) +
                       translations_.size() * sizeof(translations_[0]) +
                       own_of_vertex_.size() * sizeof(std::uint32_t) + own_plans_.size() * sizeof(OwnPlan);
+  for (const SegmentBends<S>& segment : keyframes_->bends)
+    total += sizeof segment + (segment.bend.size() + segment.twist.size()) * sizeof(S);
   for (const OwnPlan& plan : own_plans_) total += plan.times.size() * (sizeof(double) + 3 * sizeof(S));
   for (const Rays& rays : rays_)
     total += sizeof(Rays) + rays.vertices.size() * (sizeof(std::uint32_t) + 6 * sizeof(S));

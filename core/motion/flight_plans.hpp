@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/motion/curved_piece.hpp"
 #include "core/motion/piece.hpp"
 #include "core/motion/round_positions.hpp"
 
@@ -32,10 +33,18 @@ struct Translation {
                ///< end without rounding
 };
 
-/// The flight plans of one body's vertices: exact piecewise-linear functions of the stored numbers (truth A)
-/// over keyframes at arbitrary times, with exceptions for vertices whose plan changed at run time. Before its
-/// first and after its last keyframe a body rests. Positions are truth A, correctly rounded (truth B). Copies
-/// share the keyframes; plan changes belong to one copy.
+/// The curves of one segment between two keyframes: the coefficients of curved_piece.hpp, [vertex][3]. An
+/// empty list means zeros: without `twist` all vertices are on parabolas, without both on lines.
+template <class S>
+struct SegmentBends {
+  std::vector<S> bend, twist;
+};
+
+/// The flight plans of one body's vertices: exact functions of the stored numbers (truth A) over keyframes at
+/// arbitrary times, with exceptions for vertices whose plan changed at run time. The pieces between keyframes
+/// are lines, or curves of degree 2 or 3. Before its first and after its last keyframe a body rests.
+/// Positions are truth A, correctly rounded (truth B). Copies share the keyframes; plan changes belong to one
+/// copy.
 template <class S>
 class FlightPlans {
  public:
@@ -43,7 +52,10 @@ class FlightPlans {
   /// Takes `positions` as [keyframe][vertex][3]. Throws std::invalid_argument that names the error: no
   /// keyframe, sizes that do not match, times that do not strictly increase, values that are not finite or
   /// beyond the admissible range.
-  FlightPlans(std::uint32_t vertex_count, std::vector<double> times, std::vector<S> positions);
+  /// `bends` has an entry for each segment, or none: all vertices then move on lines. Numbers of curves are
+  /// limited like coordinates. Plans of bodies with curves cannot change at run time.
+  FlightPlans(std::uint32_t vertex_count, std::vector<double> times, std::vector<S> positions,
+              std::vector<SegmentBends<S>> bends = {});
   /// Makes the plans of a body whose positions are handed in frame by frame (Playback::hand_in): its motion
   /// is unknown. `positions` [vertex][3] hold until the first hand-in. Throws std::invalid_argument like the
   /// constructor.
@@ -63,6 +75,17 @@ class FlightPlans {
   /// Returns the positions of keyframe k, [keyframed vertex][3], without the vertices' own plans. One scalar
   /// past the end may be read.
   const S* keyframe(std::size_t k) const { return keyframes_->positions.data() + 3 * k * keyframed_count_; }
+  /// Returns whether a vertex moves on a curve in some segment; in the segment k; at t and right after it.
+  bool curved() const { return !keyframes_->bends.empty(); }
+  bool curved_in(std::size_t k) const { return curved() && k + 1 < keyframe_count() && bends(k) != nullptr; }
+  bool curved_at(double t) const {
+    return curved() && t >= keyframes_->times.front() && curved_in(segment_at(t));
+  }
+  /// Return the coefficients of the curves in segment k, [vertex][3]; null: all zero. `curved` must hold.
+  const S* bends(std::size_t k) const { return coefficients(keyframes_->bends[k].bend); }
+  const S* twists(std::size_t k) const { return coefficients(keyframes_->bends[k].twist); }
+  /// Returns one coordinate's piece in segment k, which may be a chord.
+  CurvedPiece<S> curved_piece(std::uint32_t vertex, int axis, std::size_t k) const;
   bool moving() const { return handed_in_ || keyframe_count() > 1 || !own_plans_.empty(); }
   /// Returns whether lines end at keyframes; a body with a single keyframe rests there at all times.
   bool has_knots() const { return keyframed_count_ > 0 && keyframe_count() > 1; }
@@ -84,12 +107,13 @@ class FlightPlans {
   /// Returns the index k of the segment [times[k], times[k+1]) that contains t; 0 before the first, the last
   /// index past the end.
   std::size_t segment_at(double t) const;
-  /// Returns the linear piece that holds at t and right after it. `t1` is its end (infinity: never).
+  /// Returns the linear piece that holds at t and right after it. `t1` is its end (infinity: never). Throws
+  /// std::logic_error on a curve: who asks takes linear motion only (`Info::can`).
   Piece<S> piece_after(std::uint32_t vertex, int axis, double t) const;
   /// Returns the end of that piece without building it.
   double piece_end(std::uint32_t vertex, double t) const;
 
-  /// Return the time from which and the time until which every vertex stays on the line that it is on at t
+  /// Return the time from which and the time until which every vertex stays on the piece that it is on at t
   /// and right after it; infinite if there is no such limit. O(own plans).
   double lines_begin(double t) const;
   double lines_end(double t) const;
@@ -97,8 +121,8 @@ class FlightPlans {
   bool at_rest(double t) const;
   /// Returns the common translation of the body over the keyframe segment that contains t: a step that, added
   /// to each coordinate, gives that at the end but for an epsilon of the larger of these two. Returns nothing
-  /// if there is none, without a segment, or with vertices' own plans. O(vertices) at the first call per
-  /// segment; it stops early at the first vertices that differ.
+  /// if there is none, without a segment, with curves, or with vertices' own plans. O(vertices) at the first
+  /// call per segment; it stops early at the first vertices that differ.
   std::optional<Translation<S>> translation(double t) const;
 
   /// Returns an upper bound of every vertex's speed on the segment that holds at t (units per second), own
@@ -109,6 +133,13 @@ class FlightPlans {
   /// segments; 0 only if no vertex moves. Not valid for times before the last change. Costs as much as
   /// `speed_bound`.
   double displacement_bound(double t0, double t1) const;
+
+  /// Writes two points for each keyframed vertex, out[3 * vertex] and out[3 * (vertex_count + vertex)]: its
+  /// position at t, which is `begin` or `end`, moved down and up along every axis by as much as its curve may
+  /// lie below and above the chord between `begin` and `end`. Boxes around these points that are linear in
+  /// time contain the curves throughout, but for half a unit of rounding. Requires begin < end in one
+  /// segment. O(vertices).
+  void evaluate_hull(double begin, double end, double t, S* out) const;
 
   /// Throws std::invalid_argument if there is no such vertex.
   void check_vertex(std::uint32_t vertex) const;
@@ -133,7 +164,11 @@ class FlightPlans {
   struct Keyframes {
     std::vector<double> times;
     std::vector<S> positions;
+    std::vector<SegmentBends<S>> bends;  ///< by segment; empty if no segment is curved
   };
+  static const S* coefficients(const std::vector<S>& values) {
+    return values.empty() ? nullptr : values.data();
+  }
   struct OwnPlan {
     std::uint32_t vertex;
     std::vector<double> times;  // first knot: the change itself

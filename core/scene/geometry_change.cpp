@@ -41,6 +41,8 @@ void ChangingScene<S>::check(const GeometryChange<S>& change, const Playback<S>&
     vertex_counts[body] = scene_.bodies[body].plans.vertex_count();
   for (const auto& vertex : change.vertices) {
     known_body(vertex.body);
+    if (scene_.bodies[vertex.body].plans.curved())
+      refuse("a vertex is added to body " + std::to_string(vertex.body) + ", whose vertices move on curves");
     FlightPlans<S>::check_new_vertex(playback.time(), vertex.plan, vertex.position,
                                      vertex_counts[vertex.body]++);
   }

@@ -87,6 +87,20 @@ class SegmentMotion : public SteppedMotion<S> {
   double lines_end(std::uint32_t body) const { return this->playback_->plans(body).lines_end(time()); }
   /// Returns whether the body rests until `lines_end`.
   bool at_rest(std::uint32_t body) const { return this->playback_->plans(body).at_rest(time()); }
+  /// Returns whether vertices of the body move on curves until `lines_end`: `piece` and `positions_on_lines`
+  /// are for lines.
+  bool on_curves(std::uint32_t body) const { return this->playback_->plans(body).curved_at(time()); }
+  /// Returns whether some segment of the body has curves.
+  bool has_curves(std::uint32_t body) const { return this->playback_->plans(body).curved(); }
+  /// Returns two points for each vertex, [2 * vertices][3], which bound its curve between two times within
+  /// `lines_begin` and `lines_end` (FlightPlans::evaluate_hull), evaluated into `room`.
+  const S* hull_on_curves(std::uint32_t body, double begin, double end, double t,
+                          std::vector<S>& room) const {
+    const FlightPlans<S>& plans = this->playback_->plans(body);
+    room.resize(std::size_t(6) * plans.vertex_count() + 1);
+    plans.evaluate_hull(begin, end, t, room.data());
+    return room.data();
+  }
   /// Returns the common translation of the body between `lines_begin` and `lines_end`; nothing if there is
   /// none (FlightPlans::translation).
   std::optional<Translation<S>> translation(std::uint32_t body) const {

@@ -62,6 +62,12 @@ std::uint64_t hash(const Scene<S>& scene) {
     hasher.bytes(times.data(), times.size_bytes());
     hasher.bytes(body.plans.keyframe(0),
                  body.plans.keyframe_count() * 3 * body.plans.keyframed_count() * sizeof(S));
+    for (std::size_t k = 0; body.plans.curved() && k + 1 < body.plans.keyframe_count(); ++k)
+      for (const S* const values : {body.plans.bends(k), body.plans.twists(k)}) {
+        hasher.mix(values != nullptr ? 1 : 0);
+        if (values != nullptr)
+          hasher.bytes(values, std::size_t(3) * body.plans.keyframed_count() * sizeof(S));
+      }
   }
   for (const BodyPair& pair : scene.pairs) hasher.mix((std::uint64_t(pair.first) << 32) | pair.second);
   return hasher.value();

@@ -45,7 +45,18 @@ Body<S> renumbered(const Body<S>& body, std::vector<std::uint32_t> old_primitive
     for (std::uint32_t v : old_vertex)
       positions.insert(positions.end(), body.plans.keyframe(k) + std::size_t(3) * v,
                        body.plans.keyframe(k) + std::size_t(3) * v + 3);
-  result.plans = FlightPlans<S>(n, {times.begin(), times.end()}, std::move(positions));
+  std::vector<SegmentBends<S>> bends(body.plans.curved() ? times.size() - 1 : 0);
+  const auto reorder = [&](const S* values, std::vector<S>& into) {
+    for (std::size_t i = 0; values != nullptr && i < old_vertex.size(); ++i) {
+      const S* const of_vertex = values + std::size_t(3) * old_vertex[i];
+      into.insert(into.end(), of_vertex, of_vertex + 3);
+    }
+  };
+  for (std::size_t k = 0; k < bends.size(); ++k) {
+    reorder(body.plans.bends(k), bends[k].bend);
+    reorder(body.plans.twists(k), bends[k].twist);
+  }
+  result.plans = FlightPlans<S>(n, {times.begin(), times.end()}, std::move(positions), std::move(bends));
   return result;
 }
 

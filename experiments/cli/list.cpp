@@ -42,7 +42,8 @@ std::vector<std::string> capabilities_of(const Info& info) {
                                               {info.can.time_budget, "time_budget"},
                                               {info.can.contacts, "contacts"},
                                               {info.can.changes, "changes"},
-                                              {info.can.rays, "rays"}};
+                                              {info.can.rays, "rays"},
+                                              {info.can.curves, "curves"}};
   std::vector<std::string> words;
   for (const auto& [can, word] : all)
     if (can) words.push_back(word);

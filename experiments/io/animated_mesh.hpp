@@ -24,6 +24,13 @@ struct AnimatedMesh {
   std::vector<double> keyframe_times;               ///< seconds, strictly increasing, at least one
   std::vector<double> positions;                    ///< [keyframe][vertex][3]
 
+  /// The curves of a segment between two keyframes: coefficients of core/motion/curved_piece.hpp,
+  /// [vertex][3].
+  struct Bends {
+    std::vector<double> bend, twist;
+  };
+  std::vector<Bends> bends;  ///< by segment; empty: vertices move on lines
+
   // Findings of the reader that were kept or repaired (printed for the user, never an error).
   std::size_t degenerate_primitives = 0;  ///< corners on one line at the first keyframe; kept
   std::size_t merged_keyframes = 0;       ///< equal times with equal positions, merged into one

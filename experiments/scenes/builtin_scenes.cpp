@@ -8,6 +8,7 @@
 #include "experiments/common/text.hpp"
 #include "experiments/io/animated_mesh_cache.hpp"
 #include "experiments/scenes/ageing.hpp"
+#include "experiments/scenes/curves.hpp"
 #include "experiments/scenes/garment.hpp"
 #include "experiments/scenes/modal.hpp"
 #include "experiments/scenes/shapes.hpp"
@@ -216,6 +217,13 @@ Meshes hidden_crowd(const BuiltinOptions& options, const MakeProgress&) {
   return meshes;
 }
 
+/// Makes a thrown body and a sphere at rest on its way.
+template <io::AnimatedMesh (*make)(const scenes::ThrownConfig&)>
+Meshes thrown(const BuiltinOptions& options, const MakeProgress&) {
+  return {make({.triangles = options.triangles, .seed = options.seed, .keyframes = options.keyframes}),
+          scenes::icosphere(obstacle_triangles(options), {0.1, -0.05, 3.2}, 0.5)};
+}
+
 Meshes funnel_cloth(const BuiltinOptions& options, const MakeProgress&) {
   return {scenes::funnel_cloth(ageing(options)), scenes::funnel(obstacle_triangles(options))};
 }
@@ -265,6 +273,11 @@ const std::vector<BuiltinScene>& builtin_scenes() {
       {"vibrating_plate", "a plate vibrates in eight modes and cuts a sphere at rest", &vibrating_plate},
       {"dented_sheet", "a sheet gets dents one after the other and cuts a sphere at rest: few vertices move",
        &dented_sheet},
+      {"thrown_cloth", "a cloth is thrown over a sphere at rest, in gusts of wind, for two seconds: cubics",
+       &thrown<scenes::thrown_cloth>},
+      {"thrown_shards",
+       "a ball bursts into its triangles in the air, for two seconds: parabolas, braked by drag",
+       &thrown<scenes::thrown_shards>},
   };
   return list;
 }

@@ -58,6 +58,15 @@ void place(io::AnimatedMesh& mesh, const Placement& placement) {
       p[d] = matrix.m[d][0] * scaled[0] + matrix.m[d][1] * scaled[1] + matrix.m[d][2] * scaled[2] +
              placement.translate[d];
   }
+  // Curves are relative to the chords of their ends.
+  for (io::AnimatedMesh::Bends& segment : mesh.bends)
+    for (std::vector<double>* values : {&segment.bend, &segment.twist})
+      for (std::size_t i = 0; i + 2 < values->size(); i += 3) {
+        double* b = values->data() + i;
+        const double scaled[3] = {placement.scale * b[0], placement.scale * b[1], placement.scale * b[2]};
+        for (int d = 0; d < 3; ++d)
+          b[d] = matrix.m[d][0] * scaled[0] + matrix.m[d][1] * scaled[1] + matrix.m[d][2] * scaled[2];
+      }
 }
 
 void shuffle_vertices(io::AnimatedMesh& mesh, std::uint64_t seed) {
@@ -67,14 +76,19 @@ void shuffle_vertices(io::AnimatedMesh& mesh, std::uint64_t seed) {
   for (std::uint32_t i = mesh.vertex_count; i > 1; --i)
     std::swap(place_of[i - 1], place_of[noise.bits(i) % i]);
   for (std::uint32_t& v : mesh.primitive_vertices) v = place_of[v];
-  std::vector<double> moved(mesh.positions.size());
-  for (std::size_t k = 0; k < mesh.keyframe_times.size(); ++k) {
-    const std::size_t begin = 3 * k * mesh.vertex_count;
-    for (std::uint32_t v = 0; v < mesh.vertex_count; ++v)
-      for (std::size_t d = 0; d < 3; ++d)
-        moved[begin + 3 * std::size_t(place_of[v]) + d] = mesh.positions[begin + 3 * std::size_t(v) + d];
+  const auto shuffle = [&](std::vector<double>& values) {
+    std::vector<double> moved(values.size());
+    for (std::size_t begin = 0; begin < values.size(); begin += std::size_t(3) * mesh.vertex_count)
+      for (std::uint32_t v = 0; v < mesh.vertex_count; ++v)
+        for (std::size_t d = 0; d < 3; ++d)
+          moved[begin + 3 * std::size_t(place_of[v]) + d] = values[begin + 3 * std::size_t(v) + d];
+    values = std::move(moved);
+  };
+  shuffle(mesh.positions);
+  for (io::AnimatedMesh::Bends& segment : mesh.bends) {
+    shuffle(segment.bend);
+    shuffle(segment.twist);
   }
-  mesh.positions = std::move(moved);
 }
 
 }  // namespace kbvh::experiments

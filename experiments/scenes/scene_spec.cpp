@@ -13,6 +13,7 @@
 #include "experiments/common/text.hpp"
 #include "experiments/io/frames.hpp"
 #include "experiments/io/load.hpp"
+#include "experiments/scenes/curves.hpp"
 #include "experiments/scenes/shape_bodies.hpp"
 
 namespace kbvh::experiments {
@@ -73,6 +74,12 @@ io::TakeAs take_as_of(JsonReader& keys) {
   keys.fail("as", "expected given, triangles or points, got '" + word + "'");
 }
 
+bool smooth_of(JsonReader& keys) {
+  const std::string word = keys.word("curves").value_or("lines");
+  if (word == "lines" || word == "smooth") return word == "smooth";
+  keys.fail("curves", "expected lines or smooth, got '" + word + "'");
+}
+
 BodySpec read_body(const json& value, const std::string& place, const fs::path& folder) {
   const json object = value.is_string() ? body_from_text(value.get<std::string>()) : value;
   JsonReader keys(object, place);
@@ -88,13 +95,14 @@ BodySpec read_body(const json& value, const std::string& place, const fs::path& 
     std::copy(move->begin(), move->end(), body.placement.translate);
   body.as = take_as_of(keys);
   body.self = keys.truth("self").value_or(false);
+  body.smooth = smooth_of(keys);
   if (keys.has("file") == keys.has("shape"))
     throw io::InputError(place + ": a body has either a file or a shape");
   if (keys.has("shape")) {
     if (const json* triangles = keys.find("triangles"); triangles != nullptr && triangles->is_array())
       keys.fail("triangles", "a sweep belongs to the scene, a body has one number");
     body.shape = object;
-    for (const char* common : {"name", "scale", "rotate", "translate", "as", "self"})
+    for (const char* common : {"name", "scale", "rotate", "translate", "as", "self", "curves"})
       body.shape.erase(common);
     // Made once in a small size for its error messages, so that a wrong key is reported before hours of work.
     json probe = body.shape;
@@ -186,7 +194,7 @@ std::string given_name(const SceneSpec& spec) {
 
 json body_from_text(const std::string& text) {
   const std::string where = "body '" + text + "'";
-  static const std::set<std::string> words{"name", "motion", "clip", "as", "knots"},
+  static const std::set<std::string> words{"name", "motion", "clip", "as", "knots", "curves"},
       wholes{"triangles", "keyframes", "seed", "spans", "degree"},
       vectors{"translate", "centre", "step", "lower", "upper"};
   json body = json::object();
@@ -403,6 +411,7 @@ LoadedScene load(const SceneSpec& spec, const MakeProgress& progress) {
                                                                              : "") +
           counted(mesh.primitive_count(), mesh.kind == io::MeshKind::points ? "point" : "control net") +
           "; pairs with them are overlaps of boxes, not intersections");
+    if (body.smooth) scenes::smooth(mesh);
     place(mesh, body.placement);
     loaded.sources.push_back(source);
     names.push_back(mesh.name);
@@ -460,9 +469,14 @@ Scene<S> assemble(const LoadedScene& loaded) {
     body.primitives.kind = kind_of(mesh.kind);
     body.primitives.offsets = mesh.primitive_offsets;
     body.primitives.vertices = mesh.primitive_vertices;
+    std::vector<SegmentBends<S>> bends;
+    for (const io::AnimatedMesh::Bends& segment : mesh.bends)
+      bends.push_back(
+          {{segment.bend.begin(), segment.bend.end()}, {segment.twist.begin(), segment.twist.end()}});
     try {
-      body.plans = FlightPlans<S>(mesh.vertex_count, mesh.keyframe_times,
-                                  std::vector<S>(mesh.positions.begin(), mesh.positions.end()));
+      body.plans =
+          FlightPlans<S>(mesh.vertex_count, mesh.keyframe_times,
+                         std::vector<S>(mesh.positions.begin(), mesh.positions.end()), std::move(bends));
     } catch (const std::invalid_argument& problem) {
       throw io::InputError(loaded.sources[i] + ": body '" + mesh.name + "' as " +
                            (sizeof(S) == 4 ? "float" : "double") + ": " + problem.what());

@@ -24,6 +24,7 @@ struct BodySpec {
   io::TakeAs as = io::TakeAs::given;
   Placement placement;
   bool self = false;         ///< pairs within it are requested, too
+  bool smooth = false;       ///< vertices move on cubics through the keyframes (curves.hpp), not on lines
   std::optional<bool> weld;  ///< of files (io/weld.hpp); by default where no script changes single vertices
   std::string place;         ///< for messages
 };

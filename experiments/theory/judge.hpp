@@ -14,7 +14,8 @@ Claim judge_responsive(const std::vector<CountRun>& counts);                    
 Claim judge_local(const std::vector<CountRun>& counts, const std::vector<CountRun>& fans);       // T4
 Claim judge_efficient(const std::vector<CountRun>& counts, const std::vector<ExactRun>& exact);  // T5
 Claim judge_number_of_events(const std::vector<CountRun>& counts, const std::vector<ExactRun>& exact,
-                             const std::vector<GrowthFit>& fits);                             // T6
+                             const std::vector<GrowthFit>& fits,
+                             const std::vector<CurveRun>& curves = {});                       // T6
 Claim judge_independent_of_frames(const std::vector<FrameRun>& frames);                       // T7
 Claim judge_optimal(const std::vector<ExactRun>& exact, const std::vector<LooseRun>& loose);  // T8
 /// `constructed` are the frames of scenes that were constructed to refute the claim, `frames` those of the

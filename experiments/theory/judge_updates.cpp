@@ -56,7 +56,7 @@ std::vector<GrowthFit> fit_growth(const std::vector<CountRun>& counts, std::size
 }
 
 Claim judge_number_of_events(const std::vector<CountRun>& counts, const std::vector<ExactRun>& exact,
-                             const std::vector<GrowthFit>& fits) {
+                             const std::vector<GrowthFit>& fits, const std::vector<CurveRun>& curves) {
   constexpr double tolerance = 0.05;
   Claim claim{.id = "T6",
               .title = "a clip has O(lambda_s(n) log n) events, nearly O(n log n)",
@@ -67,11 +67,12 @@ Claim judge_number_of_events(const std::vector<CountRun>& counts, const std::vec
               .counter = "events and changes of a clip; breakpoints of exact envelopes",
               .bound =
                   "segments x sum over nodes and sides of (vertices below - 1); lambda_1(n) - 1 = n - 1 "
-                  "breakpoints per bound and segment; exponent of n log n not above 1 + 5%",
+                  "breakpoints per bound and segment; curves of degree 2 and 3: lambda_2(n) - 1 = 2 n - 2, "
+                  "lambda_3(n) <= n (1 + 2 H(n - 1)); exponent of n log n not above 1 + 5%",
               .condition =
                   "the bound includes the number of segments as a factor; the closeness to n log n depends "
                   "on the motion",
-              .data = {{"counts", counts}, {"exact", exact}, {"fits", fits}}};
+              .data = {{"counts", counts}, {"exact", exact}, {"fits", fits}, {"curves", curves}}};
   if (counts.empty()) return undecided(claim, "Nothing was counted.");
   double share = 0, fullest = 0;
   std::uint64_t pieces = 0, over = 0, most = 0;
@@ -88,6 +89,11 @@ Claim judge_number_of_events(const std::vector<CountRun>& counts, const std::vec
     pieces += run.pieces, over += run.over_lambda;
     fullest = std::max(fullest, run.fullest), most = std::max(most, run.most_breakpoints);
   }
+  for (const CurveRun& run : curves)
+    claim.criteria.push_back(
+        {fmt::format("bounds with more than lambda_{}(n) - 1 changes in a segment, {}, {} segments",
+                     run.order, place(run), run.segments),
+         double(run.over_lambda), Relation::equal, 0, 0, always});
   std::vector<std::string> exponents, faster;
   double worst = 0;
   std::size_t sizes = 0;
@@ -109,6 +115,10 @@ Claim judge_number_of_events(const std::vector<CountRun>& counts, const std::vec
         ", and no exact envelope of {} (bounds x segments) {} n - 1 breakpoints (the fullest has {} of them, "
         "the longest {})",
         number(pieces), over == 0 ? "has more than" : "should have more than", percent(fullest), most);
+  for (const CurveRun& run : curves)
+    claim.why +=
+        fmt::format("; on curves of degree {} ({}, {}) the fullest bound has {} of lambda_{}(n) - 1 changes",
+                    run.order, run.scene, counted(run.segments, "segment"), percent(run.fullest), run.order);
   if (fits.empty())
     claim.why += "; no family has enough sizes with events for a fit.";
   else

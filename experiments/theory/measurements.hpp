@@ -44,6 +44,20 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CountRun, scene, triangles, vertices, nodes, 
                                    updates, sum_update_certificates, max_update_certificates,
                                    max_update_steps, update_share)
 
+/// One clip of vertices on curves through the kinetic AABB tree. Sums and maxima are over bounds (nodes x
+/// sides) and segments.
+struct CurveRun {
+  std::string scene;
+  std::uint64_t triangles = 0, vertices = 0, segments = 0;
+  std::uint64_t order = 0;  ///< two plans of a segment cross at most this often: their degree
+  std::uint64_t events = 0, changes = 0, bounds = 0;
+  std::uint64_t pieces = 0, over_lambda = 0;  ///< bounds x segments; with more changes than lambda_s(n) - 1
+  std::uint64_t most_changes = 0;             ///< of one bound in one segment
+  double fullest = 0;                         ///< share of lambda_s(n) - 1, n >= 8 vertices below
+};
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CurveRun, scene, triangles, vertices, segments, order, events, changes,
+                                   bounds, pieces, over_lambda, most_changes, fullest)
+
 /// The same clip with the log of every change, checked against independently computed exact envelopes
 /// (envelope.hpp).
 struct ExactRun {

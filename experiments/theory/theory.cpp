@@ -10,6 +10,7 @@
 #include "experiments/theory/judge.hpp"
 #include "experiments/theory/measure_boxtree.hpp"
 #include "experiments/theory/measure_counts.hpp"
+#include "experiments/theory/measure_curves.hpp"
 #include "experiments/theory/measure_exact.hpp"
 #include "experiments/theory/measure_separation.hpp"
 #include "experiments/theory/theory_scenes.hpp"
@@ -106,6 +107,7 @@ class Runner {
                                 number(std::uint64_t(options_->simulation_limit)) + " triangles.");
     }
     for (const std::string& name : options_->sequences) sequence(name);
+    for (const std::string family : {"thrown_shards", "thrown_cloth"}) curves(family);
     constructed();
     report_.fits = fit_growth(report_.counts, 6);
     judge();
@@ -152,6 +154,21 @@ class Runner {
     report_.frames.insert(report_.frames.end(), frames.begin(), frames.end());
     loose_.push_back(
         get<LooseRun>("loose boxes", family, parameters, [&] { return measure_loose(scene(), 10); }));
+  }
+
+  /// Thrown bodies, in segments and in one that holds the whole flight.
+  void curves(const std::string& family) {
+    for (const std::uint32_t size : options_->sizes) {
+      if (!chosen(size, 500)) continue;
+      for (const std::uint32_t keyframes : {2U, options_->keyframes}) {
+        const std::string parameters = std::to_string(size) + "x" + std::to_string(keyframes);
+        curves_.push_back(get<CurveRun>("curves", family, parameters, [&] {
+          Scene<float> scene = moving_scene(family, size, keyframes);
+          scene.name = family;
+          return measure_curves(scene);
+        }));
+      }
+    }
   }
 
   void plan_changes(const std::string& family, const std::string& parameters, LazyScene& scene) {
@@ -242,7 +259,7 @@ class Runner {
     claims.push_back(judge_responsive(report_.counts));
     claims.push_back(judge_local(report_.counts, fans_));
     claims.push_back(judge_efficient(report_.counts, exact_));
-    claims.push_back(judge_number_of_events(report_.counts, exact_, report_.fits));
+    claims.push_back(judge_number_of_events(report_.counts, exact_, report_.fits, curves_));
     claims.push_back(judge_independent_of_frames(report_.frames));
     claims.push_back(judge_optimal(exact_, loose_));
     claims.push_back(judge_never_more_updates(report_.frames, constructed_));
@@ -261,6 +278,7 @@ class Runner {
   TheoryReport report_;
   std::vector<CountRun> fans_;
   std::vector<ExactRun> exact_;
+  std::vector<CurveRun> curves_;
   std::vector<FrameRun> constructed_;
   std::vector<LooseRun> loose_;
   std::vector<PlanRun> plans_;

@@ -34,6 +34,8 @@ std::string skipped(const StrategyEntry& entry, const TestScene<S>& test) {
               test.scene.bodies[pair.second].primitives.count() >
           entry.info.max_primitive_pairs)
         return "skipped: too large for it";
+  for (const auto& body : test.scene.bodies)
+    if (body.plans.curved() && !entry.info.can.curves) return "skipped: foresees linear motion only";
   const bool within = unsuitable_bodies(entry.info, test.scene).empty() &&
                       out_of_range(entry.info, test.scene, test.script, test.frames).empty();
   if (std::isfinite(entry.info.max_coordinate) && !within) return "skipped: beyond its range of coordinates";

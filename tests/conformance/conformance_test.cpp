@@ -15,6 +15,7 @@
 #include "core/kernels/kernel_set.hpp"
 #include "core/scene/self_pairs.hpp"
 #include "tests/conformance/check.hpp"
+#include "tests/support/curved_scenes.hpp"
 #include "tests/support/grids.hpp"
 
 namespace kbvh::test {
@@ -29,7 +30,13 @@ std::vector<std::string> all_scene_names() {
   std::vector<std::string> names = synthetic_scene_names();
   names.insert(names.end(), geometry_scene_names().begin(), geometry_scene_names().end());
   names.insert(names.end(), self_scene_names().begin(), self_scene_names().end());
+  names.insert(names.end(), curved_scene_names().begin(), curved_scene_names().end());
   return names;
+}
+
+template <class S>
+TestScene<S> scene_of(const std::string& name, std::uint32_t l = 1) {
+  return name.starts_with("curved_") ? curved_scene<S>(name, l) : synthetic_scene<S>(name, l);
 }
 
 /// Returns whether it is float's turn when scenes are not played in both scalars. The scalars take turns from
@@ -67,10 +74,9 @@ TEST_P(Conformance, KeepsItsGuaranteeOnEveryFrame) {
     const std::string where = id + " on " + scene_name + ", l = " + std::to_string(l);
     const bool float_alone = is_turn_of_float(scene_name, l);
     if (in_both_scalars() || float_alone)
-      expect_conforms(check(entry, synthetic_scene<float>(scene_name, l), l, {}, builder), where + ", float");
+      expect_conforms(check(entry, scene_of<float>(scene_name, l), l, {}, builder), where + ", float");
     if (in_both_scalars() || !float_alone)
-      expect_conforms(check(entry, synthetic_scene<double>(scene_name, l), l, {}, builder),
-                      where + ", double");
+      expect_conforms(check(entry, scene_of<double>(scene_name, l), l, {}, builder), where + ", double");
   }
 }
 
@@ -84,8 +90,8 @@ std::vector<std::string> strategy_ids() {
 std::vector<std::pair<std::string, std::string>> scenes_with_contestants() {
   std::vector<std::pair<std::string, std::string>> cases;
   for (const std::string& scene : all_scene_names()) {
-    const auto in_float = synthetic_scene<float>(scene);
-    const auto in_double = synthetic_scene<double>(scene);
+    const auto in_float = scene_of<float>(scene);
+    const auto in_double = scene_of<double>(scene);
     for (const StrategyEntry& entry : registry())
       if (skipped(entry, in_float).empty() || skipped(entry, in_double).empty())
         cases.emplace_back(scene, entry.info.id);
@@ -113,13 +119,14 @@ TEST_P(Configurations, AllConform) {
                                                                          ", width " + std::to_string(width) +
                                                                          ", leaf " + std::to_string(leaf));
   };
-  for (const std::string scene_name : {"sheets", "integer_ties", "plan_changes", "geometry_changes",
-                                       "self_rolled_cloth", "self_plan_changes"}) {
-    // Scripts make every frame expensive: fewer frames and leaf sizes.
+  for (const std::string scene_name :
+       {"sheets", "integer_ties", "plan_changes", "geometry_changes", "self_rolled_cloth",
+        "self_plan_changes", "curved_ties"}) {
+    // Scripts and curves make every frame expensive: fewer frames and leaf sizes.
     const bool scripted = scene_name != "sheets" && scene_name != "integer_ties";
     const std::uint32_t l = scripted ? 2 : 7;
-    const auto in_float = synthetic_scene<float>(scene_name, l);
-    const auto in_double = synthetic_scene<double>(scene_name, l);
+    const auto in_float = scene_of<float>(scene_name, l);
+    const auto in_double = scene_of<double>(scene_name, l);
     sweep(scene_name, scripted, [&](const BuilderConfig& builder, const std::string& where) {
       expect_conforms(check(entry, in_float, l, {}, builder), GetParam() + " on " + where + ", float");
       expect_conforms(check(entry, in_double, l, {}, builder), GetParam() + " on " + where + ", double");
@@ -146,8 +153,8 @@ TEST_P(Kernels, Conform) {
   const KernelSet before = active_kernel_set();
   use_kernel_set(GetParam());
   for (const std::string& scene_name : all_scene_names()) {
-    const auto in_float = synthetic_scene<float>(scene_name, 3);
-    const auto in_double = synthetic_scene<double>(scene_name, 3);
+    const auto in_float = scene_of<float>(scene_name, 3);
+    const auto in_double = scene_of<double>(scene_name, 3);
     for (const StrategyEntry& entry : registry()) {
       if (entry.info.topology.own || entry.info.max_primitive_pairs != 0) continue;
       const std::string where = entry.info.id + " on " + scene_name + " with " + name(GetParam());
@@ -161,8 +168,8 @@ TEST_P(Kernels, Conform) {
                                     [](const StrategyEntry& entry) { return entry.info.id == "bottom_up"; });
     if (found == registry().end()) break;  // a suite over other people's strategies
     const StrategyEntry& refit = *found;
-    const auto in_float = synthetic_scene<float>(scene_name, 7);
-    const auto in_double = synthetic_scene<double>(scene_name, 7);
+    const auto in_float = scene_of<float>(scene_name, 7);
+    const auto in_double = scene_of<double>(scene_name, 7);
     for (const std::uint32_t width : {2u, 4u, 8u})
       for (std::uint32_t leaf = 1; leaf <= 16; ++leaf) {
         const BuilderConfig builder{.method = BuildMethod::median, .width = width, .leaf_size = leaf};

@@ -105,6 +105,11 @@ expect("event by event" "${output}" "\n0 events are left\n")
 step("contacts and changes of plans" ${build}/world_contacts)
 expect("contacts and changes of plans" "${output}" "\ncontacts on the way down, contacts on the way up\n")
 
+step("a cloth by Eigen and the broad phase" ${build}/cloth_step)
+expect("a cloth by Eigen and the broad phase" "${output}" "^1600 updates, [1-9][0-9]* searches\n[1-9][0-9]* contacts of vertices and faces, 0 edges through faces\n$")
+step("the broad phase in C" ${build}/nearby_in_c)
+expect("the broad phase in C" "${output}" "^height 0.375: 0 pairs\nheight 0.25: 1 pairs\nV: coordinate x of vertex 0 is 1e\\+300, beyond the limit of 1e\\+100 in double\n$")
+
 if(NOT EXISTS ${prefix}/bin/kbvh)
   message(STATUS "no program was installed: list and bench are not tried")
   return()

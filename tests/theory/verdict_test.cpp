@@ -181,6 +181,14 @@ TEST(Verdict, NumberOfEvents) {
   ExactRun over = exact_run();
   over.over_lambda = 1;
   EXPECT_EQ(judge_number_of_events(good, {over}, {}).verdict(), fails);
+  const auto with_curves = [&](const CurveRun& run) {
+    return judge_number_of_events(good, {exact_run()}, fit_growth(good, 6), {run}).verdict();
+  };
+  CurveRun curves{
+      .scene = "thrown", .triangles = 500, .segments = 1, .order = 2, .changes = 90, .pieces = 100};
+  EXPECT_EQ(with_curves(curves), holds);
+  curves.over_lambda = 1;
+  EXPECT_EQ(with_curves(curves), fails);
   for (CountRun& run : good) run.events *= run.vertices;
   EXPECT_EQ(judge_number_of_events(good, {}, fit_growth(good, 6)).verdict(), fails);
   for (CountRun& run : good) run.breakpoint_bound = 1e18;

@@ -11,6 +11,7 @@
 #include <cstdlib>
 #include <new>
 
+#include "broad_phase_oracle.hpp"
 #include "core/contract/registry.hpp"
 #include "core/families/volumes/volume_hierarchy.hpp"
 #include "core/families/wide/wide_hierarchy.hpp"
@@ -379,6 +380,52 @@ TEST(Allocation, BytesAreWhatIsHeld) {
     if (entry.info.has_float) check(declared_over_held<float>(entry));
     if (entry.info.has_double) check(declared_over_held<double>(entry));
   }
+}
+
+/// Every kind of update and question of a broad phase, which ends where it began.
+template <class S>
+std::uint64_t allocations_of_a_round(BroadPhase<S>& broad, CandidateBuffer& found) {
+  const broad_phase::Mesh<S> first = broad_phase::crumpled<S>(24, 1),
+                             second = broad_phase::crumpled<S>(24, 2);
+  const std::vector<std::uint32_t> moved{3, 5, 100};
+  const std::vector<S> bounds(first.vertex_count(), S(0.01));
+  const std::uint64_t before = allocations;
+  const auto ask = [&] {
+    for (const CandidateKind kind : candidate_kinds) {
+      broad.detect(kind, found);
+      broad.within(kind, S(0.05), found);
+    }
+  };
+  broad.update(second.begin());
+  ask();
+  broad.update(first.begin(), moved);
+  ask();
+  broad.update(first.begin(), second.begin());
+  ask();
+  broad.valid_for(S(0.1));
+  broad.update(first.begin());
+  ask();
+  broad.valid_for(bounds);
+  ask();
+  broad.valid_for(S(0));
+  broad.forget_trees();
+  ask();
+  return allocations - before;
+}
+
+template <class S>
+void expect_no_allocations_of_broad_phases() {
+  const broad_phase::Mesh<S> mesh = broad_phase::crumpled<S>(24, 1);
+  BroadPhase<S> broad;
+  mesh.build(broad, S(0.05));
+  CandidateBuffer found;
+  for (int round = 0; round < 2; ++round) allocations_of_a_round(broad, found);
+  EXPECT_EQ(allocations_of_a_round(broad, found), 0u);
+}
+
+TEST(Allocation, BroadPhasesAllocateNothingOnceWarm) {
+  expect_no_allocations_of_broad_phases<float>();
+  expect_no_allocations_of_broad_phases<double>();
 }
 
 TEST(Allocation, IsCounted) {

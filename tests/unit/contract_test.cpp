@@ -295,6 +295,17 @@ TEST(Contract, RefitsAnswerPairsWithinABody) {
                           [](const StrategyEntry& entry) { return !entry.info.can.self_pairs; }));
 }
 
+// Curves are followed by positions and bounds of displacement alone, or declared.
+TEST(Contract, StrategiesSayWhetherTheyFollowCurves) {
+  for (const StrategyEntry& entry : registry())
+    if (entry.info.foresight <= Foresight::step_bound) {
+      EXPECT_TRUE(entry.info.can.curves) << entry.info.id;
+    }
+  EXPECT_TRUE(find_strategy("kinetic_aabb").info.can.curves);
+  EXPECT_TRUE(find_strategy("linear_bounds").info.can.curves);
+  EXPECT_FALSE(find_strategy("interval_join").info.can.curves);
+}
+
 TEST(Contract, RefitsWithoutForesightAreBaselinesOrExcused) {
   EXPECT_EQ(undeclared_refits(registry(), excused_refits()), std::vector<std::string>{});
 }

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "core/continuous/algebraic_time.hpp"
+#include "core/motion/algebraic_time.hpp"
 #include "core/geometry/triangle_triangle.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 

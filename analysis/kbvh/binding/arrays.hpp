@@ -157,6 +157,7 @@ auto method(R (T::*function)(A...) const) {
 }
 
 // The parts of the module.
+void bind_broad_phase(py::module_& module);
 void bind_world(py::module_& module);
 void bind_scenes(py::module_& module);
 void bind_studies(py::module_& module);

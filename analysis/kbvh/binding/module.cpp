@@ -27,4 +27,5 @@ PYBIND11_MODULE(_core, module) {
   bind_scenes(module);
   bind_studies(module);
   bind_strategies(module);
+  bind_broad_phase(module);
 }

@@ -34,6 +34,9 @@ class BuiltTree : public WideTree<S> {
   /// unused.
   void fit(const S* primitive_boxes);
 
+  /// Returns the boxes of the leaves, [leaf][8], like those of primitives: `fit` computes them.
+  S* leaf_boxes() { return leaf_boxes_.data(); }
+
   /// Returns the tree as a topology, and the box of each node: for audits.
   Topology topology(std::vector<Box<double>>& boxes) const;
 

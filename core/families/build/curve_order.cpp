@@ -25,16 +25,23 @@ PrimitiveList::PrimitiveList(const Primitives& primitives) : count(primitives.li
 template <class S>
 void CurveOrder<S>::take(const Primitives& primitives, const PrimitiveList& list, const S* positions,
                          KernelSet kernels) {
-  kernels_ = kernels;
-  count_ = list.count;
+  const Room to = room(primitives.count(), list.count, kernels);
   if (count_ == 0) return;
-  const std::size_t room = std::size_t(8) * primitives.count() + 8;
-  if (boxes_.size() < room) boxes_.resize(room);
+  build_kernels<S>(kernels).primitive_boxes({primitives.offsets.data(), primitives.vertices.data(),
+                                             list.corners_each, list.ids(), count_, positions, to.boxes,
+                                             to.centres, to.stride, to.extent});
+}
+
+template <class S>
+typename CurveOrder<S>::Room CurveOrder<S>::room(std::uint32_t primitives, std::uint32_t living,
+                                                 KernelSet kernels) {
+  kernels_ = kernels;
+  count_ = living;
+  const std::size_t size = std::size_t(8) * primitives + 8;
+  if (boxes_.size() < size) boxes_.resize(size);
   stride_ = (std::size_t(count_) + 15) / 16 * 16;
   if (centres_.size() < 3 * stride_) centres_.resize(3 * stride_);
-  build_kernels<S>(kernels).primitive_boxes({primitives.offsets.data(), primitives.vertices.data(),
-                                             list.corners_each, list.ids(), count_, positions, boxes_.data(),
-                                             centres_.data(), stride_, extent_});
+  return {boxes_.data(), centres_.data(), stride_, extent_};
 }
 
 template <class S>

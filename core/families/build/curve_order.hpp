@@ -29,6 +29,14 @@ class CurveOrder {
  public:
   /// Computes boxes and centres of all living primitives. O(corners).
   void take(const Primitives& primitives, const PrimitiveList& list, const S* positions, KernelSet kernels);
+  /// Boxes and centres of all living primitives, to be written by a caller that makes boxes of its own in
+  /// place of `take`: as PrimitiveBoxesJob describes them. `primitives` is the number of ids.
+  struct Room {
+    S *boxes, *centres;
+    std::size_t stride;
+    S* extent;
+  };
+  Room room(std::uint32_t primitives, std::uint32_t living, KernelSet kernels);
   /// Sorts the primitives along a curve through the grid over their centres. O(primitives).
   void sort(const PrimitiveList& list, Curve curve);
 

@@ -17,15 +17,17 @@ namespace kbvh {
 template <class S, class Queue>
 class Certifier {
   using Clock = typename Queue::ClockType;
+  using Now = typename InstantOf<Clock, S>::type;
 
  public:
   Certifier(Clock& clock, Queue& queue, Counters& count) : clock_(&clock), queue_(&queue), count_(&count) {}
 
   /// Returns the instant at which an event happens. Computes the exact time, into `crossing`, if `exact` is
-  /// set, if the event lies in no segment, or if the body has per-vertex plans. Otherwise the segment
-  /// identifies the instant well enough.
-  Instant<S> instant_of(const Event& event, bool exact, Crossing<S>& crossing) const {
+  /// set, if the event lies in no segment, or if the body has per-vertex plans or curves. Otherwise the
+  /// segment identifies the instant well enough.
+  Now instant_of(const Event& event, bool exact, typename Now::Exact& crossing) const {
     exact = exact || event.segment == Event::no_segment || clock_->plans(event.body).has_own_plans();
+    if constexpr (requires { clock_->on_curves(event.body); }) exact = exact || clock_->on_curves(event.body);
     if (exact) crossing = clock_->crossing(event);
     return {event.begin, event.end, exact ? &crossing : nullptr, event.segment};
   }
@@ -40,7 +42,7 @@ class Certifier {
   /// Schedules the certificate's earliest failure from `now` on, and replaces the scheduled one. The winner
   /// may be among the candidates; `others` are the candidates without it, as far as the caller knows their
   /// number. O(candidates x segments until the failure).
-  void certify(Event event, const Instant<S>& now, std::span<const std::uint32_t> candidates,
+  void certify(Event event, const Now& now, std::span<const std::uint32_t> candidates,
                std::size_t others = not_counted) {
     withdraw(event.slot);  // the queue must not hold this slot while the clock stores its new crossing
     if constexpr (reads_keyframes)
@@ -79,7 +81,7 @@ class Certifier {
 
   /// Adds a candidate that is not ahead of the winner at `now`: the certificate fails at the scheduled time
   /// or earlier.
-  void add_candidate(Event event, const Instant<S>& now, std::uint32_t challenger) {
+  void add_candidate(Event event, const Now& now, std::uint32_t challenger) {
     if (challenger == event.winner) return;
     event.loser = challenger;
     count_->add(Counter::certificates_made);
@@ -107,7 +109,7 @@ class Certifier {
  private:
   static constexpr std::size_t not_counted = std::numeric_limits<std::size_t>::max();
   static constexpr double never = std::numeric_limits<double>::infinity();
-  static constexpr bool reads_keyframes = requires(const Clock& clock, const Instant<S>& now) {
+  static constexpr bool reads_keyframes = requires(const Clock& clock, const Now& now) {
     clock.keyframe_search(0, 0, now, 0.0);
   };
 
@@ -118,7 +120,7 @@ class Certifier {
   }
   /// Returns the time up to which a search from `now` on looks for a failure; infinite if the queue has no
   /// reviews.
-  double horizon_after(std::uint32_t body, const Instant<S>& now) const {
+  double horizon_after(std::uint32_t body, const Now& now) const {
     if constexpr (requires { clock_->horizon(body, now, queue_->look_ahead()); })
       if (const std::size_t keyframes = queue_->look_ahead(); keyframes > 0)
         return clock_->horizon(body, now, keyframes);
@@ -138,7 +140,7 @@ class Certifier {
   }
 
   /// Implements `certify` for a body without per-vertex plans.
-  void certify_keyframed(Event event, const Instant<S>& now, std::span<const std::uint32_t> candidates,
+  void certify_keyframed(Event event, const Now& now, std::span<const std::uint32_t> candidates,
                          std::size_t others) {
     if (clock_->keyframe_count(event.body) < 2) return;
     const double horizon = horizon_after(event.body, now);
@@ -187,7 +189,7 @@ class Certifier {
     clock_->set_failure(other, ahead_at);
     return clock_->overtakes_first(first, {}, other, {});
   }
-  void add_keyframed(Event event, const Instant<S>& now) {
+  void add_keyframed(Event event, const Now& now) {
     if (clock_->keyframe_count(event.body) < 2) return;
     double until = never;
     std::optional<Event> next;

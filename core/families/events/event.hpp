@@ -63,15 +63,29 @@ struct PackedEvent {
 static_assert(sizeof(PackedEvent) == 24);
 
 /// An instant at which certificates are computed: the time of a frame or change, a double, or the exact time
-/// of an event.
-template <class S>
+/// of an event. `ExactTime` is the form in which the clock states exact times.
+template <class S, class ExactTime = Crossing<S>>
 struct Instant {
-  double begin;  ///< not after the instant
-  double end;    ///< after the instant, or equal to begin if the instant is begin itself
-  const Crossing<S>* exact = nullptr;         ///< the event's exact time; null: the instant is `begin`
+  using Exact = ExactTime;
+  double begin;                  ///< not after the instant
+  double end;                    ///< after the instant, or equal to begin if the instant is begin itself
+  const Exact* exact = nullptr;  ///< the event's exact time; null: the instant is `begin`
   std::uint32_t segment = Event::no_segment;  ///< as the event's
 
   static Instant at(double t) { return {t, t, nullptr}; }
+};
+
+/// The instants of a clock: of crossings, unless the clock names another form of exact times.
+template <class Clock, class S>
+struct InstantOf {
+  using type = Instant<S>;
+};
+template <class Clock, class S>
+requires requires {
+  typename Clock::ExactTime;
+}
+struct InstantOf<Clock, S> {
+  using type = Instant<S, typename Clock::ExactTime>;
 };
 
 /// Decides all questions about event times exactly, on the flight plans (truth A): order, whether an event is

@@ -30,6 +30,12 @@ class WatchedEvent {
   BoundWatch<S>* watch_;
 };
 
+/// Returns the crossing of linear pieces by which a clock states an exact time; null if it is another form.
+template <class S>
+const Crossing<S>* crossing_in(const Crossing<S>& exact) {
+  return &exact;
+}
+
 /// An observer of kinetic trees (see NoObserver in observer.hpp) that writes changes of bounds to the logs of
 /// `watch`.
 template <class S>
@@ -37,18 +43,19 @@ struct BoundObserver {
   const BoundWatch<S>* watch = nullptr;
 
   bool reads_instants() const { return watch->log != nullptr || watch->event != nullptr; }
-  template <class T>
+  template <class T, class Exact>
   void realiser_changed(std::uint32_t body, std::uint32_t node, Side side, std::uint32_t old_vertex,
-                        std::uint32_t new_vertex, const Instant<T>& now) {
+                        std::uint32_t new_vertex, const Instant<T, Exact>& now) {
     if (!reads_instants()) return;
+    const Crossing<S>* const crossing = now.exact != nullptr ? crossing_in(*now.exact) : nullptr;
     const BoundNotice<S> change{body,
                                 node,
                                 side,
                                 old_vertex,
                                 new_vertex,
                                 now.begin,
-                                now.exact != nullptr,
-                                now.exact != nullptr ? *now.exact : Crossing<S>{}};
+                                crossing != nullptr,
+                                crossing != nullptr ? *crossing : Crossing<S>{}};
     if (watch->log != nullptr) watch->log->push_back(change);
     if (watch->event != nullptr) watch->event->push_back(change);
   }
@@ -66,8 +73,11 @@ ScheduledEvent<S> described(const Forest& forest, const Event& event) {
   out.winner = event.winner;
   out.loser = event.loser;
   out.time = {event.hint, event.error};
-  out.has_crossing = true;
-  out.crossing = forest.clock().crossing(event);
+  const auto exact = forest.clock().crossing(event);
+  if (const Crossing<S>* const crossing = crossing_in(exact)) {
+    out.has_crossing = true;
+    out.crossing = *crossing;
+  }
   return out;
 }
 

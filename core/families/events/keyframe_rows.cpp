@@ -22,7 +22,7 @@ KeyframeRows<S>::KeyframeRows(const FlightPlans<S>& plans, std::span<const SlabD
 template <class S>
 void KeyframeRows<S>::copy() {
   const std::size_t keyframes = times_.size();
-  if (keyframes < 2 || vertices_ == 0) return;
+  if (keyframes < 2 || vertices_ == 0 || plans_->curved()) return;
   values_.resize(directions_.size() * vertices_ * keyframes + row_padding, S(0));
   // Copies in blocks that fit into the cache on both sides.
   constexpr std::size_t block = 64;

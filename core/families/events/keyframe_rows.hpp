@@ -19,7 +19,7 @@ class KeyframeRows {
   /// Copies nothing yet: only the times may be asked for.
   KeyframeRows(const FlightPlans<S>& plans, std::span<const SlabDirection> directions);
   /// Copies the keyframes, again if they were copied before; O(keyframes x directions) time and memory.
-  /// Copies nothing for a body with one keyframe.
+  /// Copies nothing for a body with one keyframe, or with curves.
   void copy();
 
   std::span<const double> times() const { return times_; }

@@ -68,7 +68,8 @@ class KineticForest {
   }
 
   /// Prefetches the data that handling the event will read. Each step reads what the step before prefetched.
-  void fetch_ahead(const PackedEvent& event, std::uint32_t slot, int step) const {
+  template <class StoredEvent>
+  void fetch_ahead(const StoredEvent& event, std::uint32_t slot, int step) const {
     if (step == 0)
       for (const std::uint32_t vertex : {event.winner, event.loser}) clock_.fetch_ahead(event, vertex);
     if constexpr (requires { trees_[event.body].fetch_ahead(event, slot, step); })

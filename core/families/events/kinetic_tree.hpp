@@ -46,6 +46,7 @@ template <class S, class Queue, class Observer, int K>
 class KineticTree {
   /// One bit for each side, and one more.
   using SideBits = std::conditional_t<K <= 7, std::uint8_t, std::uint32_t>;
+  using Now = typename InstantOf<typename Queue::ClockType, S>::type;
 
  public:
   static constexpr Side sides = K;
@@ -93,7 +94,7 @@ class KineticTree {
 
   /// Finds every realiser at t and schedules every certificate. O(nodes log nodes + vertices of leaves).
   void initialise(double t) {
-    const auto now = Instant<S>::at(t);
+    const auto now = Now::at(t);
     const auto start = [&](std::uint32_t node) {
       for (Side side = 0; side < sides; ++side) {
         realisers_[std::size_t(sides) * node + side] = best_at(node, side, t, candidate(node, side, 0));
@@ -113,8 +114,8 @@ class KineticTree {
   /// ancestor that the winner realises (leaf and tree events, Z&W s.4). O(depth) certificates.
   void handle(const Event& event) {
     KBVH_ASSERT(event.body == body_);
-    Crossing<S> crossing;
-    const Instant<S> now = certifier_.instant_of(event, reads_instants(observer_), crossing);
+    typename Now::Exact crossing;
+    const Now now = certifier_.instant_of(event, reads_instants(observer_), crossing);
     const Side side = event.side;
     std::uint32_t node = node_of(event.slot);
     KBVH_ASSERT(realiser(node, side) == event.winner);
@@ -134,11 +135,12 @@ class KineticTree {
   /// Searches the next failure of a certificate that holds at t, a keyframe time.
   void review(const Event& event, double t) {
     count_->add(Counter::queue_operations);
-    certify(node_of(event.slot), event.side, Instant<S>::at(t));
+    certify(node_of(event.slot), event.side, Now::at(t));
   }
   /// Prefetches the data that handling the event will read: in step 0 that of the node, in step 1 that of its
   /// parent, in step 2 the keyframes of the other vertices.
-  void fetch_ahead(const PackedEvent& event, std::uint32_t slot_of_event, int step) const {
+  template <class StoredEvent>
+  void fetch_ahead(const StoredEvent& event, std::uint32_t slot_of_event, int step) const {
     const std::uint32_t node = node_of(slot_of_event);
     const Side side = event.side;
     if (step == 0) {
@@ -266,7 +268,7 @@ class KineticTree {
     return best;
   }
 
-  void replace(std::uint32_t node, Side side, std::uint32_t vertex, const Instant<S>& now) {
+  void replace(std::uint32_t node, Side side, std::uint32_t vertex, const Now& now) {
     std::uint32_t& realiser = realisers_[std::size_t(sides) * node + side];
     const std::uint32_t old = realiser;
     realiser = vertex;
@@ -275,7 +277,7 @@ class KineticTree {
   }
 
   /// Schedules the earliest failure of the side's certificate from `now` on, and replaces the scheduled one.
-  void certify(std::uint32_t node, Side side, const Instant<S>& now) {
+  void certify(std::uint32_t node, Side side, const Now& now) {
     Event event;
     event.winner = realiser(node, side);
     event.slot = slot(node, side);
@@ -334,7 +336,7 @@ class KineticTree {
   /// Restores realisers and certificates at t, from `touched_` upwards, after changes of plans (`vertices`,
   /// ascending) or of candidates.
   void repair(double t, std::span<const std::uint32_t> vertices) {
-    const auto now = Instant<S>::at(t);
+    const auto now = Now::at(t);
     marked_.resize(topology_.size(), 0);
     moved_.resize(topology_.size(), 0);
     ++mark_;

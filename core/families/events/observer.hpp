@@ -22,10 +22,10 @@ namespace kbvh {
 /// returns false, the tree does not compute exact times of events for the observer.
 struct NoObserver {
   static constexpr bool reads_instants() { return false; }
-  template <class S>
+  template <class S, class Exact>
   void realiser_changed(std::uint32_t /*body*/, std::uint32_t /*node*/, Side /*side*/,
                         std::uint32_t /*old_vertex*/, std::uint32_t /*new_vertex*/,
-                        const Instant<S>& /*now*/) {}
+                        const Instant<S, Exact>& /*now*/) {}
   void realiser_plan_changed(std::uint32_t /*body*/, std::uint32_t /*node*/) {}
 };
 

@@ -15,6 +15,19 @@ namespace kbvh {
 
 namespace {
 constexpr std::uint32_t none_used = ~std::uint32_t(0);
+
+/// Returns the primitives over two points for each vertex: v and v + vertices.
+Primitives doubled(const Primitives& primitives, std::uint32_t vertices) {
+  Primitives result;
+  result.kind = PrimitiveKind::control_nets;
+  std::vector<std::uint32_t> points;
+  for (std::uint32_t p = 0; p < primitives.count(); ++p) {
+    points.clear();
+    for (const std::uint32_t v : primitives[p]) points.insert(points.end(), {v, v + vertices});
+    result.add(points);
+  }
+  return result;
+}
 }  // namespace
 
 template <class S>
@@ -33,6 +46,9 @@ LinearBounds<S>::LinearBounds(const SceneView<S>& scene, const SegmentMotion<S>&
       near_(scene.body_count(), 0) {
   for (Segment& segment : segments_) segment.sides.resize(body_count());
   for (std::uint32_t body = 0; body < body_count(); ++body) {
+    if (motion.has_curves(body))
+      bodies_[body].hulls.assign(topologies[body], doubled(scene.primitives(body), scene.vertex_count(body)),
+                                 kernels);
     hierarchy(body).assign(std::move(topologies[body]), scene.primitives(body), kernels);
     for (Segment& segment : segments_) segment.sides[body].body = &bodies_[body];
   }
@@ -68,7 +84,9 @@ auto LinearBounds<S>::begin_end(Segment& segment, const SegmentMotion<S>& motion
   }
   at.child_bounds = child_bounds.data();
   at.node_bounds = node_bounds.data();
-  at.positions = motion.positions_on_lines(index, t, body.room[at.slot]);
+  at.positions = side.on_curves
+                     ? motion.hull_on_curves(index, segment.begin, segment.end, t, body.room[at.slot])
+                     : motion.positions_on_lines(index, t, body.room[at.slot]);
   at.made = ++body.made;
   if (body.hierarchy.empty()) return {};
   at.excess = 0;
@@ -87,7 +105,7 @@ auto LinearBounds<S>::begin_end(Segment& segment, const SegmentMotion<S>& motion
       ++counts_[index].translated_apart;
       return {};
     }
-    const VertexRun all{0, scene_.vertex_count(index)};
+    const VertexRun all{0, scene_.vertex_count(index) * (side.on_curves ? 2 : 1)};
     bounds_kernels<S>(body.hierarchy.kernels()).of_runs(&all, 1, at.positions, node_bounds.data());
     ++counts_[index].apart;
     return {};
@@ -99,13 +117,14 @@ auto LinearBounds<S>::begin_end(Segment& segment, const SegmentMotion<S>& motion
     ++counts_[index].translated;
     return {};
   }
-  return {child_bounds.data(), node_bounds.data(), at.positions, std::uint32_t(nodes)};
+  return {side.on_curves ? &body.hulls : &body.hierarchy, child_bounds.data(), node_bounds.data(),
+          at.positions, std::uint32_t(nodes)};
 }
 
 template <class S>
 void LinearBounds<S>::step_refit(std::uint32_t body, Refit& refit, std::uint64_t nodes) {
   if (refit.left == 0) return;
-  const WideHierarchy<S>& hierarchy = bodies_[body].hierarchy;
+  const WideHierarchy<S>& hierarchy = *refit.hierarchy;
   const std::uint32_t begin = refit.left - std::uint32_t(std::min<std::uint64_t>(refit.left, nodes));
   Workers& workers = motion_.workers();
   if (workers.several() && begin == 0 && refit.left == hierarchy.node_count()) {
@@ -213,6 +232,7 @@ bool LinearBounds<S>::begin_side(Segment& segment, const Segment& before, const 
   side.apart = old.apart;
   side.rounding = unit_rounding<S>;  // positions are rounded correctly
   side.at_rest = motion.at_rest(body);
+  side.on_curves = motion.on_curves(body);
   side.current = true;
   std::array<std::uint32_t, 3> used{none_used, none_used, none_used};
   if (what == Before::stays) used = {old.at[0].slot, old.at[1].slot, none_used};
@@ -228,7 +248,7 @@ bool LinearBounds<S>::begin_side(Segment& segment, const Segment& before, const 
     ++skip_counts(body).at_rest;
     return false;
   }
-  if (old.current && !old.at_rest && before.end == segment.begin) {
+  if (old.current && !old.at_rest && before.end == segment.begin && !old.on_curves && !side.on_curves) {
     side.at[0] = old.at[1];
   } else {
     side.at[0].slot = free_slot();
@@ -256,6 +276,7 @@ void LinearBounds<S>::next_segment() {
   if (!anew) foreseen_ = std::min(16.0, 2 * foreseen_);
   segment.pieces = whole_ ? 1 : new_knot ? cuts_.pieces : before.pieces;
   choose_segment(segment, motion_, t);
+  const double chosen_end = segment.end;
   for (std::uint32_t body = 0; body < body_count(); ++body) {
     if (!begin_side(segment, before, motion_, body, t, Before::ends)) continue;
     // A line without end may leave the admissible range: shorten the segment.
@@ -265,6 +286,10 @@ void LinearBounds<S>::next_segment() {
         if (!segment.sides[other].at_rest) make_end(segment, motion_, other, 1, segment.end);
     }
   }
+  // The bounds of curves are for the segment as it is now.
+  if (segment.end != chosen_end)
+    for (std::uint32_t body = 0; body < body_count(); ++body)
+      if (segment.sides[body].on_curves) make_end(segment, motion_, body, 0, segment.begin);
   present_ = 1 - present_;
   if (new_knot && cuts_.max_looseness > 0 && !whole_ && !segment.endless) cut_while_loose(t);
   finish(segment, motion_);
@@ -285,6 +310,8 @@ bool LinearBounds<S>::start_ahead(const SegmentMotion<S>& motion) {
   // Such a segment's cuts are decided only when it begins, and a change of plans would discard the work.
   if (whole_ || cuts_.max_looseness > 0 || horizon_.frames() > 0 || motion.time() != before.end) return false;
   bool ends = false;
+  for (std::uint32_t body = 0; body < body_count(); ++body)
+    if (motion_.on_curves(body) || motion.on_curves(body)) return false;  // ends are not shared
   for (std::uint32_t body = 0; body < body_count(); ++body)
     ends = ends || motion.lines_end(body) != std::numeric_limits<double>::infinity();
   if (!ends) return false;
@@ -348,7 +375,8 @@ void LinearBounds<S>::cut_while_loose(double t) {
     if (segment.begin == begin && segment.end == end) return;  // as short as doubles allow
     for (std::uint32_t body = 0; body < body_count(); ++body) {
       if (segment.sides[body].at_rest) continue;
-      if (segment.begin != begin) make_end(segment, motion_, body, 0, segment.begin);
+      if (segment.begin != begin || segment.sides[body].on_curves)
+        make_end(segment, motion_, body, 0, segment.begin);
       make_end(segment, motion_, body, 1, segment.end);
     }
   }

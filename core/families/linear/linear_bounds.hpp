@@ -24,6 +24,10 @@ namespace kbvh {
 /// configured by `SegmentCuts`. Every side of a box is inflated by the largest rounding error between the
 /// flight plans and the positions of frames (WideEnds): about two ulps of its own coordinate.
 ///
+/// Vertices may move on curves: the boxes are then those of two points for each vertex, its ends moved by as
+/// much as the curve may leave their chord (FlightPlans::evaluate_hull). Only the boxes follow: joins and
+/// their tests of triangles over time are for lines.
+///
 /// The boxes of a body that translates over a segment are translated instead of refitted, as long as no side
 /// exceeds the tight one by more than 4 epsilons of its coordinate (TranslatedBoxes).
 template <class S>
@@ -115,6 +119,7 @@ class LinearBounds {
   };
   /// Boxes under construction, from the last node to the first.
   struct Refit {
+    const WideHierarchy<S>* hierarchy = nullptr;
     S *child_bounds = nullptr, *node_bounds = nullptr;
     const S* positions = nullptr;
     std::uint32_t left = 0;  ///< remaining nodes

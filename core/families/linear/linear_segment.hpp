@@ -29,6 +29,9 @@ template <class S>
 struct LinearBody {
   static constexpr std::uint32_t slots = 3;
   WideHierarchy<S> hierarchy;  ///< its boxes are free for temporary use
+  /// The same tree over two points for each vertex, those that bound its curve; empty for bodies without
+  /// curves.
+  WideHierarchy<S> hulls;
   UnfilledArray<S> child_bounds[slots], node_bounds[slots];
   std::vector<S> room[slots];  ///< for positions that are not stored elsewhere
   /// Rows of the leaves that a join visited, with stamps of their positions.
@@ -78,8 +81,8 @@ struct LinearBody {
             slab_stamp};
   }
   std::size_t bytes() const {
-    std::size_t total =
-        hierarchy.bytes() + slabs.size() * sizeof(SpanSlab<S>) + slab_stamps.size() * sizeof(std::uint32_t);
+    std::size_t total = hierarchy.bytes() + hulls.bytes() + slabs.size() * sizeof(SpanSlab<S>) +
+                        slab_stamps.size() * sizeof(std::uint32_t);
     for (std::uint32_t slot = 0; slot < slots; ++slot)
       total += (child_bounds[slot].size() + node_bounds[slot].size() + room[slot].capacity() +
                 rows[slot].size() + blocks[slot].size()) *
@@ -95,6 +98,7 @@ struct BodySegmentBounds {
   LinearBody<S>* body = nullptr;
   EndpointBounds<S> at[2];  ///< the same at both ends for a body at rest
   bool at_rest = false, current = false;
+  bool on_curves = false;  ///< boxes contain points of `hulls`, for this segment alone
   /// The body meets no other body's box over this segment; only its root's box is read.
   bool apart = false;
   S rounding = unit_rounding<S>;  ///< as in WideEnds

@@ -102,7 +102,7 @@ class RowsOnDemand {
 
   void find_lines(const SegmentMotion<S>& motion, std::uint32_t body) {
     line_ends_[0] = nullptr;
-    if (!motion.as_in_the_scene(body)) return;
+    if (!motion.as_in_the_scene(body) || motion.on_curves(body)) return;
     if (motion.at_rest(body)) {
       rests_until_ = motion.lines_end(body);
       return;

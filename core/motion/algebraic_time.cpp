@@ -1,6 +1,7 @@
-#include "core/continuous/algebraic_time.hpp"
+#include "core/motion/algebraic_time.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <optional>
 
 #include "core/base/assert.hpp"
@@ -11,7 +12,11 @@ using Integer = Polynomial::Integer;
 
 namespace {
 
-/// Returns the middle of [k, k + 1] / 2^exponent or of any two neighbouring times with one exponent.
+/// Returns the middle of two times with one exponent.
+DyadicTime middle(const DyadicTime& begin, const DyadicTime& end) {
+  return {begin.numerator + end.numerator, begin.exponent + 1};
+}
+/// Returns the middle of [k, k + 1] / 2^exponent.
 DyadicTime middle(const DyadicTime& begin) {
   return {begin.numerator * 2 + 1, begin.exponent + 1};
 }
@@ -19,7 +24,32 @@ DyadicTime doubled(const DyadicTime& t) {
   return {t.numerator * 2, t.exponent + 1};
 }
 
+/// Returns value / 2^lowest, which must be an integer.
+Integer scaled(const Dyadic& value, int lowest) {
+  if (value.sign() == 0) return 0;
+  const int shift = value.exponent() - lowest;
+  if (shift >= 0) return value.mantissa() << unsigned(shift);
+  return value.mantissa() / (Integer(1) << unsigned(-shift));
+}
+/// Returns the exponent of the lowest bit that is set.
+int lowest_bit(const Dyadic& value) {
+  return value.exponent() + int(lsb(abs(value.mantissa())));
+}
+
 }  // namespace
+
+Polynomial Polynomial::from(std::span<const Dyadic> coefficients) {
+  KBVH_ASSERT(coefficients.size() <= 4);
+  Polynomial result;
+  std::optional<int> lowest;
+  for (const Dyadic& value : coefficients)
+    if (value.sign() != 0) lowest = std::min(lowest.value_or(lowest_bit(value)), lowest_bit(value));
+  if (!lowest) return result;
+  for (std::size_t i = 0; i < coefficients.size(); ++i)
+    result.coefficient_[i] = scaled(coefficients[i], *lowest);
+  result.set_degree(int(coefficients.size()) - 1);
+  return result;
+}
 
 Polynomial operator+(const Polynomial& a, const Polynomial& b) {
   Polynomial result;
@@ -114,6 +144,48 @@ int Polynomial::sign_at(const Integer& numerator, unsigned exponent) const {
   return value.sign();
 }
 
+int Polynomial::sign_throughout(const Integer& begin, const Integer& end, unsigned exponent) const {
+  KBVH_ASSERT(degree_ <= 3);
+  if (is_zero()) return 0;
+  // With t = (begin + (end - begin) s) / 2^exponent, times 2^(degree exponent): the coefficients of s^i, then
+  // 1, 2 or 6 times the Bernstein coefficients over 0 <= s <= 1.
+  constexpr int binomial[4][4] = {{1, 0, 0, 0}, {1, 1, 0, 0}, {1, 2, 1, 0}, {1, 3, 3, 1}};
+  const Integer length = end - begin;
+  Integer power[4], length_power = 1;
+  for (int i = 0; i <= degree_; ++i) {
+    Integer sum = 0, begin_power = 1;
+    for (int j = i; j <= degree_; ++j) {
+      sum += ((coefficient_[j] * binomial[j][i]) << (exponent * unsigned(degree_ - j))) * begin_power;
+      begin_power *= begin;
+    }
+    power[i] = sum * length_power;
+    length_power *= length;
+  }
+  int throughout = 0;
+  for (int k = 0; k <= degree_; ++k) {
+    Integer sum = 0;
+    for (int i = 0; i <= k; ++i) sum += power[i] * (6 * binomial[k][i] / binomial[degree_][i]);
+    const int sign = sum.sign();
+    if (k == 0) throughout = sign;
+    const bool outer = k == 0 || k == degree_;
+    if (sign != throughout && (outer || sign != 0)) return 0;
+  }
+  return throughout;
+}
+
+DyadicTime::DyadicTime(const Dyadic& value) {
+  if (value.sign() == 0) return;
+  const int lowest = std::min(lowest_bit(value), 0);
+  numerator = scaled(value, lowest);
+  exponent = unsigned(-lowest);
+}
+
+int compare(const DyadicTime& a, const DyadicTime& b) {
+  const unsigned exponent = std::max(a.exponent, b.exponent);
+  const Integer x = a.numerator << (exponent - a.exponent), y = b.numerator << (exponent - b.exponent);
+  return x.compare(y);
+}
+
 SturmSequence::SturmSequence(const Polynomial& p, const Polynomial& h) {
   sequence_.push_back(p);
   if (h.is_zero()) return;
@@ -144,36 +216,66 @@ double AlgebraicTime::rounded(const DyadicTime& t, unsigned up) {
   return std::ldexp(Integer(below + up).convert_to<double>(), -int(bits));
 }
 
-int AlgebraicTime::sign_throughout(const Polynomial& q) const {
-  KBVH_ASSERT(q.degree() <= 2);
-  const Integer& n = begin_.numerator;
-  const unsigned e = begin_.exponent;
-  const int first = q.sign_at(n, e), last = q.sign_at(end_.numerator, e);
-  if (first == 0 || first != last) return 0;
-  if (q.degree() < 2) return first;
-  // Twice the middle coefficient, times 2^(2 e).
-  const Integer middle = (q[0] << (2 * e + 1)) + ((q[1] * (2 * n + 1)) << e) + 2 * q[2] * n * (n + 1);
-  return middle.sign() == first ? first : 0;
+AlgebraicTime::AlgebraicTime(const Polynomial& p, DyadicTime begin, DyadicTime end)
+    : p_(p), begin_(std::move(begin)), end_(std::move(end)) {
+  const unsigned exponent = std::max(begin_.exponent, end_.exponent);
+  for (DyadicTime* t : {&begin_, &end_}) {
+    t->numerator <<= exponent - t->exponent;
+    t->exponent = exponent;
+  }
 }
 
 int AlgebraicTime::sign(const Polynomial& q) const {
   if (q.is_zero()) return 0;
   if (dyadic_) return q.sign_at(begin_.numerator, begin_.exponent);
-  if (const int sign = sign_throughout(q)) return sign;
+  if (const int sign = q.sign_throughout(begin_.numerator, end_.numerator, begin_.exponent)) return sign;
   // A Tarski query; p' q may be reduced modulo p, which preserves the Cauchy index.
   const Polynomial h = (p_.derivative() * q).remainder(p_);
   return SturmSequence(p_, h).index(begin_, end_);
 }
 
+int AlgebraicTime::compare_to(const DyadicTime& t) const {
+  if (dyadic_) return compare(begin_, t);
+  if (compare(t, begin_) <= 0) return 1;
+  if (compare(t, end_) >= 0) return -1;
+  const Polynomial line = Polynomial::line(-t.numerator, (Integer(1) << t.exponent) - t.numerator);
+  return sign(line);
+}
+
+int AlgebraicTime::compare_to(AlgebraicTime other) const {
+  if (other.dyadic_) return compare_to(other.begin_);
+  if (dyadic_) return -other.compare_to(begin_);
+  if (compare(end_, other.begin_) <= 0) return -1;
+  if (compare(other.end_, begin_) <= 0) return 1;
+  // The only root of the other's polynomial in its interval is the other number.
+  if (sign(other.p_) == 0 && compare_to(other.begin_) > 0 && compare_to(other.end_) < 0) return 0;
+  AlgebraicTime mine = *this;
+  for (int bits = std::max(mine.width_bits(), other.width_bits());;) {
+    bits = std::max(bits, 0) + 32;
+    mine.refine(unsigned(bits));
+    other.refine(unsigned(bits));
+    if (mine.dyadic_ || other.dyadic_) return mine.compare_to(other);
+    if (compare(mine.end_, other.begin_) <= 0) return -1;
+    if (compare(other.end_, mine.begin_) <= 0) return 1;
+  }
+}
+
+int AlgebraicTime::width_bits() const {
+  const Integer length = end_.numerator - begin_.numerator;
+  if (length.is_zero()) return std::numeric_limits<int>::max();
+  const int above = int(msb(length)) + (msb(length) == lsb(length) ? 0 : 1);
+  return int(begin_.exponent) - above;
+}
+
 void AlgebraicTime::refine(unsigned bits) {
-  if (dyadic_ || begin_.exponent >= bits) return;
+  if (dyadic_ || width_bits() >= int(bits)) return;
   // At a root of odd multiplicity the sign changes; only the number of roots reveals the others.
   const int before = p_.sign_at(begin_.numerator, begin_.exponent);
   const bool crossing = before != p_.sign_at(end_.numerator, end_.exponent);
   std::optional<SturmSequence> roots;
   if (!crossing) roots.emplace(p_, p_.derivative());
-  while (begin_.exponent < bits) {
-    const DyadicTime centre = middle(begin_);
+  for (int rest = int(bits) - width_bits(); rest > 0; --rest) {
+    const DyadicTime centre = middle(begin_, end_);
     const int sign = p_.sign_at(centre.numerator, centre.exponent);
     if (sign == 0) {
       begin_ = end_ = centre;

@@ -1,16 +1,18 @@
 #pragma once
 #include <cstdint>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include "core/motion/exact_arithmetic.hpp"
 
 namespace kbvh {
 
-/// A polynomial in t with integer coefficients, of degree at most 4: coefficient[i] of t^i. Degree -1: zero.
+/// A polynomial in t with integer coefficients, of degree at most 5: coefficient[i] of t^i. Degree -1: zero.
 class Polynomial {
  public:
   using Integer = Dyadic::Integer;
-  static constexpr int max_degree = 4;
+  static constexpr int max_degree = 5;
 
   Polynomial() = default;
   /// Makes a polynomial of degree 1 from its values at t = 0 and t = 1.
@@ -21,6 +23,8 @@ class Polynomial {
     result.set_degree(1);
     return result;
   }
+  /// Makes a positive multiple of the polynomial with these coefficients, [0] of t^0, at most four.
+  static Polynomial from(std::span<const Dyadic> coefficients);
 
   int degree() const { return degree_; }
   bool is_zero() const { return degree_ < 0; }
@@ -39,6 +43,10 @@ class Polynomial {
 
   /// Returns the sign at t = numerator / 2^exponent.
   int sign_at(const Integer& numerator, unsigned exponent) const;
+  /// Returns the signs of the Bernstein coefficients over [begin, end] / 2^exponent if they agree and none of
+  /// the outer two is zero: the polynomial has this sign throughout. Otherwise returns 0. The degree is at
+  /// most 3, and begin < end.
+  int sign_throughout(const Integer& begin, const Integer& end, unsigned exponent) const;
 
  private:
   void set_degree(int at_most) {
@@ -54,7 +62,14 @@ class Polynomial {
 struct DyadicTime {
   Polynomial::Integer numerator = 0;
   unsigned exponent = 0;
+
+  DyadicTime() = default;
+  DyadicTime(Polynomial::Integer n, unsigned e) : numerator(std::move(n)), exponent(e) {}
+  explicit DyadicTime(const Dyadic& value);
 };
+
+/// Returns the sign of a - b.
+int compare(const DyadicTime& a, const DyadicTime& b);
 
 /// The signed remainder sequence of p and h. It computes the Cauchy index of h / p between two times that are
 /// not roots of p (Basu, Pollack & Roy 2006, theorem 2.58): with h = p' this is the number of distinct roots
@@ -71,27 +86,36 @@ class SturmSequence {
   std::vector<Polynomial> sequence_;
 };
 
-/// An algebraic number in [0, 1]: a dyadic number, or the only root of a polynomial between two neighbouring
-/// dyadic numbers with one exponent.
+/// An algebraic number: a dyadic number, or the only root of a polynomial strictly between two dyadic numbers
+/// with one exponent, which are no roots.
 class AlgebraicTime {
  public:
   explicit AlgebraicTime(DyadicTime t) : begin_(t), end_(t), dyadic_(true) {}
-  AlgebraicTime(const Polynomial& p, DyadicTime begin, DyadicTime end)
-      : p_(p), begin_(std::move(begin)), end_(std::move(end)) {}
+  /// Takes a polynomial of degree 1 to 3.
+  AlgebraicTime(const Polynomial& p, DyadicTime begin, DyadicTime end);
 
-  /// Returns the exact sign of a polynomial of degree at most 2.
+  /// Returns the exact sign of a polynomial of degree at most 3.
   int sign(const Polynomial& q) const;
+  /// Returns the sign of this number - t.
+  int compare_to(const DyadicTime& t) const;
+  /// Returns the sign of this number - other.
+  int compare_to(AlgebraicTime other) const;
   /// Halves the interval until it is no wider than 2^-bits.
   void refine(unsigned bits);
-  /// Returns the refined interval; exact down to a width of 2^-50, beyond that rounded outwards.
+  /// Return the refined interval of a number in [0, 1]; exact down to a width of 2^-50, beyond that rounded
+  /// outwards.
   double begin() const { return rounded(begin_, 0); }
   double end() const { return rounded(end_, dyadic_ && begin_.exponent <= 50 ? 0 : 1); }
+  /// Returns whether the number is known to be dyadic, and then equal to `exact_begin`.
+  bool is_dyadic() const { return dyadic_; }
+  /// Return the interval, which contains the number in its interior unless it is dyadic.
+  const DyadicTime& exact_begin() const { return begin_; }
+  const DyadicTime& exact_end() const { return end_; }
 
  private:
-  /// Returns the sign of q everywhere between the ends, by its Bernstein coefficients there; 0 if these do
-  /// not decide.
-  int sign_throughout(const Polynomial& q) const;
   static double rounded(const DyadicTime& t, unsigned up);
+  /// Returns the smallest b for which the interval is no wider than 2^-b; negative for wide ones.
+  int width_bits() const;
   Polynomial p_;
   DyadicTime begin_, end_;
   bool dyadic_ = false;

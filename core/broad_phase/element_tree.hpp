@@ -1,0 +1,85 @@
+#pragma once
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/broad_phase/kernels/element_boxes.hpp"
+#include "core/broad_phase/kernels/element_pairs.hpp"
+#include "core/families/build/curve_builders.hpp"
+
+namespace kbvh {
+
+/// The tree over all elements of one kind, whose boxes are made from those of the vertices: built along a
+/// Morton curve, then refitted, whole or below the vertices that moved. Keeps its memory.
+template <class S>
+class ElementTree {
+ public:
+  /// Takes the elements, whose lists must outlive the tree. `leaf_size` is 5 to 16.
+  void start(const Primitives& elements, std::uint32_t leaf_size, KernelSet kernels);
+
+  /// What a search would find: nothing yet, boxes of another time, or current boxes.
+  enum class State : std::uint8_t { unbuilt, outdated, current };
+  State state() const { return state_; }
+  /// Marks the boxes as those of another time.
+  void outdate() {
+    if (state_ == State::current) state_ = State::outdated;
+  }
+  /// Makes the tree current from the vertices' boxes [vertex][8]: builds it where there is none, or where the
+  /// surface of a refitted one has grown beyond `most_growth` times what it was when built. O(elements).
+  void refresh(const S* vertex_boxes, double most_growth);
+  /// Forgets the shape of the tree, so that the next `refresh` builds another.
+  void forget() { state_ = State::unbuilt; }
+  /// Updates a current tree whose boxes of `moved` vertices changed: leaves of their elements, and the nodes
+  /// above as far as boxes change. O(elements at the vertices x height). The first call makes lists of the
+  /// elements at each vertex, O(corners).
+  void refit_moved(const S* vertex_boxes, std::uint32_t vertices, std::span<const std::uint32_t> moved);
+
+  /// Returns what searches read; the tree must be current and not empty.
+  ElementLeaves<S> leaves();
+  bool empty() const { return tree_.empty(); }
+  std::uint32_t padded_leaf_size() const { return tree_.padded_leaf_size(); }
+  Box<S> root_box() const { return tree_.root_box(); }
+
+  /// Counts of work since `start`.
+  struct Work {
+    std::uint64_t builds = 0, refits = 0, partial_refits = 0;
+    std::uint64_t leaves_remade = 0, nodes_remade = 0;  ///< by partial refits
+  };
+  const Work& work() const { return work_; }
+  std::size_t bytes() const;
+
+ private:
+  ElementBoxesJob<S> job(const S* vertex_boxes);
+  void build(const S* vertex_boxes);
+  void list_corners();
+  void list_incidence(std::uint32_t vertices);
+  void list_places();
+  /// Computes the boxes of one leaf and its elements; returns whether the leaf's box changed.
+  bool remake_leaf(const ElementBoxesJob<S>& boxes, std::uint32_t leaf);
+  double surface();
+
+  const Primitives* elements_ = nullptr;
+  std::uint32_t corners_each_ = 1;
+  KernelSet kernels_ = KernelSet::portable;
+  State state_ = State::unbuilt;
+  std::optional<PrimitiveList> list_;
+  CurveOrder<S> order_;
+  LinearBuilder<S> builder_;
+  BuiltTree<S> tree_;
+  typename CurveOrder<S>::Room room_{};
+  UnfilledArray<std::uint32_t> leaf_corners_;  // [leaf][corner][padded]
+  double surface_when_built_ = 0;
+  // For partial refits. Incidence is listed at the first one, places in the tree at the first one after a
+  // build.
+  std::vector<std::uint32_t> first_of_vertex_, elements_of_vertex_;
+  std::vector<std::uint32_t> leaf_of_element_, node_of_leaf_, parents_;
+  std::vector<std::uint64_t> dirty_leaves_, dirty_nodes_;
+  bool places_listed_ = false;
+  Work work_;
+};
+
+extern template class ElementTree<float>;
+extern template class ElementTree<double>;
+
+}  // namespace kbvh

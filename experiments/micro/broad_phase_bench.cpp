@@ -1,0 +1,343 @@
+// What kbvh::broad_phase takes, over other ways to the same pairs, all in one run and by turns: swept
+// vertex-face and edge-edge candidates between two frames from scratch and with a known tree, iterates within
+// a bound, and updates of few vertices. Prints medians in ms and ratios.
+//   kbvh_broad_phase_bench [FRAMES] [REPETITIONS]
+// FRAMES is a folder with a pair of frames (default: cloth-ball of the data folder).
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <functional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "core/broad_phase/broad_phase.hpp"
+#include "core/families/sweep/sorted_boxes.hpp"
+#include "core/judge/session.hpp"
+#include "experiments/common/environment.hpp"
+#include "experiments/study/box_candidates.hpp"
+#include "experiments/study/contestants.hpp"
+
+namespace kbvh::experiments {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// Work that is timed by turns with its rivals.
+struct Contestant {
+  std::string name;
+  std::function<std::size_t()> work;  ///< returns the number of pairs
+  std::vector<double> ms{};
+  std::size_t pairs = 0;
+};
+
+/// Plays all contestants once without a clock, then by turns, and prints medians and how many times as long
+/// as the first each one takes.
+void compare(const char* title, std::vector<Contestant> contestants, int repetitions) {
+  for (int r = -1; r < repetitions; ++r)
+    for (Contestant& contestant : contestants) {
+      const auto begin = Clock::now();
+      contestant.pairs = contestant.work();
+      const std::chrono::duration<double, std::milli> took = Clock::now() - begin;
+      if (r >= 0) contestant.ms.push_back(took.count());
+    }
+  std::printf("%s\n", title);
+  double first = 0;
+  for (Contestant& contestant : contestants) {
+    std::sort(contestant.ms.begin(), contestant.ms.end());
+    const double median = contestant.ms[contestant.ms.size() / 2];
+    if (first == 0) first = median;
+    std::printf("  %-52s %10.3f ms  %7.2f x  %zu pairs\n", contestant.name.c_str(), median, median / first,
+                contestant.pairs);
+  }
+}
+
+template <class S>
+struct Mesh {
+  std::vector<S> v[2];
+  MatrixView<std::uint32_t> e, f;
+  explicit Mesh(const FramePair& frames)
+      : e(MatrixView<std::uint32_t>::by_rows(frames.edges[0].data(), frames.edges.size(), 2)),
+        f(MatrixView<std::uint32_t>::by_rows(frames.faces[0].data(), frames.faces.size(), 3)) {
+    for (int i = 0; i < 2; ++i) v[i].assign(frames.positions[i].begin(), frames.positions[i].end());
+  }
+  MatrixView<S> view(int frame) const {
+    return MatrixView<S>::by_rows(v[frame].data(), v[frame].size() / 3, 3);
+  }
+};
+
+template <class S>
+std::size_t detect_both(BroadPhase<S>& broad, CandidateBuffer (&out)[2]) {
+  broad.detect_face_vertex_candidates(out[0]);
+  broad.detect_edge_edge_candidates(out[1]);
+  return out[0].size() + out[1].size();
+}
+
+/// Sort and sweep on the axis of the largest extent, by the SIMD kernels of the family `sweep`.
+class Sweep {
+ public:
+  explicit Sweep(const FramePair& frames)
+      : elements_(make_elements(
+            frames.positions[0].size() / 3,
+            MatrixView<std::uint32_t>::by_rows(frames.edges[0].data(), frames.edges.size(), 2),
+            MatrixView<std::uint32_t>::by_rows(frames.faces[0].data(), frames.faces.size(), 3))) {}
+
+  std::size_t find(const Mesh<double>& mesh, CandidateBuffer (&out)[2]) {
+    const std::size_t values = mesh.v[0].size();
+    positions_.resize(2 * values + 1);
+    std::copy_n(mesh.v[0].data(), values, positions_.data());
+    std::copy_n(mesh.v[1].data(), values, positions_.data() + values);
+    for (std::size_t kind = 0; kind < element_kinds; ++kind) sort(kind);
+    run(2, 0, CandidateKind::face_vertex, out[0]);
+    run(1, 1, CandidateKind::edge_edge, out[1]);
+    return out[0].size() + out[1].size();
+  }
+
+ private:
+  void sort(std::size_t kind) {
+    const Primitives& list = elements_.lists[kind];
+    if (twice_[kind].count() == 0) {
+      for (std::uint32_t p = 0; p < list.count(); ++p) {
+        std::vector<std::uint32_t> corners(list[p].begin(), list[p].end());
+        for (const std::uint32_t v : list[p]) corners.push_back(v + elements_.vertex_count());
+        twice_[kind].add(corners);
+      }
+      sorted_[kind].start(PrimitiveList(twice_[kind]), active_kernel_set());
+    }
+    const PrimitiveList all(twice_[kind]);
+    order_.take(twice_[kind], all, positions_.data(), active_kernel_set());
+    sorted_[kind].update(order_.boxes(), axis());
+  }
+  std::uint32_t axis() const {
+    std::uint32_t widest = 0;
+    double extent[3];
+    for (std::size_t k = 0; k < 3; ++k) {
+      double low = positions_[k], high = low;
+      for (std::size_t i = k; i + 1 < positions_.size(); i += 3) {
+        low = std::min(low, positions_[i]);
+        high = std::max(high, positions_[i]);
+      }
+      extent[k] = high - low;
+      if (extent[k] > extent[widest]) widest = std::uint32_t(k);
+    }
+    return widest;
+  }
+  void run(std::size_t a, std::size_t b, CandidateKind kind, CandidateBuffer& out) {
+    out.clear();
+    chunk_.resize(4096);
+    SweepJob<double> job{};
+    job.a = sorted_[a].side(0);
+    job.b = sorted_[b].side(a == b ? 0 : 1);
+    job.axis = axis();
+    job.block = SweepJob<double>::no_block;
+    job.out = chunk_.data();
+    job.out_room = chunk_.size();
+    const auto kernel = a == b ? sweep_kernels<double>(active_kernel_set()).one
+                               : sweep_kernels<double>(active_kernel_set()).two;
+    while (job.next < job.a.count) {
+      kernel(job);
+      for (std::size_t i = 0; i < job.found; ++i) {
+        Candidate pair{chunk_[i].primitive_a, chunk_[i].primitive_b};
+        if (a == b && pair.first > pair.second) std::swap(pair.first, pair.second);
+        if (!elements_.incident(kind, pair)) out.push_back(pair);
+      }
+      job.found = 0;
+    }
+  }
+
+  Elements elements_;
+  Primitives twice_[element_kinds];
+  SortedBoxes<double> sorted_[element_kinds];
+  CurveOrder<double> order_;
+  std::vector<double> positions_;
+  std::vector<FoundPair> chunk_;
+};
+
+void swept(const FramePair& frames, int repetitions) {
+  const Mesh<double> mesh(frames);
+  const Mesh<float> mesh_float(frames);
+  BroadPhase<double> known;
+  BroadPhase<float> known_float;
+  known.build(mesh.view(0), mesh.view(1), mesh.e, mesh.f);
+  known_float.build(mesh_float.view(0), mesh_float.view(1), mesh_float.e, mesh_float.f);
+  CandidateBuffer out[2];
+  Sweep sweep(frames);
+  std::vector<Contestant> contestants;
+  contestants.push_back({"kbvh::broad_phase, double, new object and buffers", [&] {
+                           BroadPhase<double> broad;
+                           CandidateBuffer fresh[2];
+                           broad.build(mesh.view(0), mesh.view(1), mesh.e, mesh.f);
+                           return detect_both(broad, fresh);
+                         }});
+  contestants.push_back({"kbvh::broad_phase, double, known tree", [&] {
+                           known.update(mesh.view(0), mesh.view(1));
+                           return detect_both(known, out);
+                         }});
+  contestants.push_back({"kbvh::broad_phase, float, known tree", [&] {
+                           known_float.update(mesh_float.view(0), mesh_float.view(1));
+                           return detect_both(known_float, out);
+                         }});
+  contestants.push_back({"sort and sweep (SIMD), from scratch", [&] {
+                           Sweep fresh_sweep(frames);
+                           CandidateBuffer fresh[2];
+                           return fresh_sweep.find(mesh, fresh);
+                         }});
+  contestants.push_back({"sort and sweep (SIMD), known order", [&] { return sweep.find(mesh, out); }});
+  contestants.push_back({"bottom_up on a scene of features, from scratch", [&] {
+                           const BoxCandidates found = box_candidates(frames, BoxMargin::none);
+                           return std::size_t(found.vertex_face + found.edge_edge);
+                         }});
+  compare("Swept vertex-face and edge-edge candidates between two frames", std::move(contestants),
+          repetitions);
+}
+
+/// Solver iterates: 20 steps of a tenth of a mean edge, of which each vertex makes its own.
+void iterates(const FramePair& frames, int repetitions) {
+  const Mesh<double> mesh(frames);
+  double edge = 0;
+  for (const auto& [a, b] : frames.edges) {
+    double squared = 0;
+    for (std::size_t k = 0; k < 3; ++k) squared += std::pow(mesh.v[0][3 * a + k] - mesh.v[0][3 * b + k], 2);
+    edge += std::sqrt(squared) / double(frames.edges.size());
+  }
+  // Iterates converge: together they move each vertex by a tenth of an edge.
+  std::vector<std::vector<double>> positions(20, mesh.v[0]);
+  std::uint64_t state = 1;
+  for (std::size_t i = 0; i < mesh.v[0].size(); ++i) {
+    state = state * 6364136223846793005ULL + 1442695040888963407ULL;
+    const double way = 0.1 * edge * (double(state >> 11) * 0x1p-52 - 1);
+    for (std::size_t k = 0; k < positions.size(); ++k)
+      positions[k][i] += way * (1 - std::pow(0.7, double(k)));
+  }
+  const double radius = 0.1 * edge;
+  BroadPhase<double> each, bounded;
+  CandidateBuffer out[2];
+  const auto view = [](const std::vector<double>& v) {
+    return MatrixView<double>::by_rows(v.data(), v.size() / 3, 3);
+  };
+  each.build(mesh.view(0), mesh.e, mesh.f, radius);
+  bounded.build(mesh.view(0), mesh.e, mesh.f, radius);
+  bounded.valid_for(0.1 * edge);
+  std::size_t sum = 0;
+  std::uint64_t detections = 0;
+  compare("20 iterates of a solver step",
+          {{"valid_for(a tenth of an edge)",
+            [&] {
+              sum = 0;
+              bounded.forget_trees();
+              const std::uint64_t before = bounded.detections();
+              for (const auto& v : positions) {
+                bounded.update(view(v));
+                sum += bounded.candidates(CandidateKind::face_vertex).size() +
+                       bounded.candidates(CandidateKind::edge_edge).size();
+              }
+              detections = bounded.detections() - before;
+              return sum;
+            }},
+           {"detection at each",
+            [&] {
+              sum = 0;
+              for (const auto& v : positions) {
+                each.update(view(v));
+                sum += detect_both(each, out);
+              }
+              return sum;
+            }}},
+          repetitions);
+  std::printf("  searches of the first: %llu of 40\n", (unsigned long long)detections);
+}
+
+/// A sheet of n x n vertices, of which some move.
+void moved(std::uint32_t n, int repetitions) {
+  std::vector<float> v;
+  std::vector<std::uint32_t> e, f;
+  for (std::uint32_t y = 0; y < n; ++y)
+    for (std::uint32_t x = 0; x < n; ++x) {
+      const std::uint32_t i = y * n + x;
+      v.insert(v.end(), {float(x), float(y), float(std::sin(0.05 * x) * std::cos(0.04 * y))});
+      if (x + 1 < n) e.insert(e.end(), {i, i + 1});
+      if (y + 1 < n) e.insert(e.end(), {i, i + n});
+      if (x + 1 < n && y + 1 < n) {
+        e.insert(e.end(), {i + 1, i + n});
+        f.insert(f.end(), {i, i + 1, i + n, i + 1, i + n + 1, i + n});
+      }
+    }
+  const auto view = [&] { return MatrixView<float>::by_rows(v.data(), v.size() / 3, 3); };
+  const std::uint32_t count = n * n / 100, side = std::uint32_t(std::sqrt(double(count)));
+  std::vector<std::uint32_t> patch, scattered;
+  for (std::uint32_t y = 0; y < side; ++y)
+    for (std::uint32_t x = 0; x < side; ++x) patch.push_back((n / 2 + y) * n + n / 3 + x);
+  for (std::uint32_t i = 0; i < count; ++i)
+    scattered.push_back(std::uint32_t((std::uint64_t(i) * 7919 * 100) % (n * n)));
+  BroadPhase<float> broad[3];
+  CandidateBuffer out;
+  for (auto& one : broad) {
+    one.build(view(), MatrixView<std::uint32_t>::by_rows(e.data(), e.size() / 2, 2),
+              MatrixView<std::uint32_t>::by_rows(f.data(), f.size() / 3, 3), 0.1F);
+    one.detect_face_vertex_candidates(out);
+    one.detect_edge_edge_candidates(out);
+  }
+  int turn = 0;
+  const auto shift = [&](const std::vector<std::uint32_t>& vertices) {
+    for (const std::uint32_t i : vertices) v[3 * i + 2] += turn % 2 == 0 ? 0.01F : -0.01F;
+    ++turn;
+  };
+  const std::string title =
+      "1 % of " + std::to_string(n * n) + " vertices moved, all three trees made current";
+  compare(title.c_str(),
+          {{"update(V), whole refit",
+            [&] {
+              shift(patch);
+              broad[0].update(view());
+              broad[0].refresh();
+              return std::size_t(0);
+            }},
+           {"update(V, moved), one patch",
+            [&] {
+              shift(patch);
+              broad[1].update(view(), patch);
+              broad[1].refresh();
+              return std::size_t(0);
+            }},
+           {"update(V, moved), scattered",
+            [&] {
+              shift(scattered);
+              broad[2].update(view(), scattered);
+              broad[2].refresh();
+              return std::size_t(0);
+            }}},
+          10 * repetitions);
+}
+
+int run(int argc, char** argv) {
+  const std::filesystem::path folder =
+      argc > 1 ? std::filesystem::path(argv[1]) : data_folder() / "ccd" / "frames" / "cloth-ball";
+  const int repetitions = argc > 2 ? std::max(1, std::atoi(argv[2])) : 5;
+  std::printf("kernels: %s\n", name(active_kernel_set()));
+  if (is_frame_pair(folder)) {
+    const FramePair frames = read_frame_pair(folder);
+    std::printf("%s: %zu vertices, %zu edges, %zu faces\n", frames.name.c_str(),
+                frames.positions[0].size() / 3, frames.edges.size(), frames.faces.size());
+    swept(frames, repetitions);
+    iterates(frames, repetitions);
+  } else {
+    std::printf("no pair of frames in %s\n", folder.c_str());
+  }
+  moved(538, repetitions);
+  return 0;
+}
+
+}  // namespace
+}  // namespace kbvh::experiments
+
+int main(int argc, char** argv) {
+  try {
+    return kbvh::experiments::run(argc, argv);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "kbvh_broad_phase_bench: %s\n", error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,127 @@
+"""The broad phase from Python: candidates against all pairs, arrays as they lie, errors that name what is wrong."""
+
+import unittest
+
+import numpy as np
+
+import kbvh
+
+KINDS = ("vertex_vertex", "edge_vertex", "edge_edge", "face_vertex", "edge_face", "face_face")
+
+
+def sheet(side, seed):
+    """Returns a crumpled sheet: vertices, edges, faces."""
+    random = np.random.default_rng(seed)
+    at = np.stack(np.meshgrid(np.arange(side), np.arange(side), indexing="ij"), axis=-1).reshape(-1, 2)
+    v = np.column_stack([np.abs(np.remainder(at[:, 0] + side / 4, side / 2) - side / 4), at[:, 1], 0.05 * at[:, 0]])
+    v = v + 0.2 * random.uniform(-1, 1, v.shape)
+    corner = (np.arange(side - 1)[:, None] * side + np.arange(side - 1)).ravel()
+    faces = np.concatenate([np.stack([corner, corner + 1, corner + side], 1),
+                            np.stack([corner + 1, corner + side + 1, corner + side], 1)])  # fmt: skip
+    edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    return v, edges, faces
+
+
+def all_pairs(kind, v, edges, faces, radius, v1=None):
+    """Returns candidates by definition, for coordinates whose sums with radius / 2 need no rounding to compare."""
+    lists = {"vertex": np.arange(len(v))[:, None], "edge": edges, "face": faces}
+    first, second = (lists[word] for word in kind.split("_"))
+    both = v[None] if v1 is None else np.stack([v, v1])
+    low, high = both.min(0) - radius / 2, both.max(0) + radius / 2
+    boxes = [(low[ids].min(1), high[ids].max(1)) for ids in (first, second)]
+    (low_a, high_a), (low_b, high_b) = boxes
+    meet = np.all((low_a[:, None] <= high_b[None]) & (low_b[None] <= high_a[:, None]), axis=2)
+    meet &= ~(first[:, None, :, None] == second[None, :, None, :]).any(axis=(2, 3))
+    if first is second:
+        meet &= np.triu(np.ones_like(meet), 1)
+    return {(int(a), int(b)) for a, b in np.argwhere(meet)}
+
+
+def pairs(found):
+    return {(int(a), int(b)) for a, b in found}
+
+
+class Candidates(unittest.TestCase):
+    def test_are_those_of_all_pairs(self):
+        v, edges, faces = sheet(10, 1)
+        w = v + 0.3 * np.random.default_rng(2).uniform(-1, 1, v.shape)
+        broad = kbvh.BroadPhase()
+        broad.build(v, edges, faces, radius=0.125)
+        for kind in KINDS:
+            self.assertEqual(pairs(broad.candidates(kind)), all_pairs(kind, v, edges, faces, 0.125), kind)
+        broad.update(v, w)
+        for kind in KINDS:
+            found = broad.candidates(kind)
+            self.assertEqual(len(found), len(pairs(found)))
+            self.assertEqual(pairs(found), all_pairs(kind, v, edges, faces, 0.125, w), kind)
+        broad.build(v, edges, faces, radius=0.125, v1=w)
+        self.assertEqual(pairs(broad.candidates("edge_edge")), all_pairs("edge_edge", v, edges, faces, 0.125, w))
+
+    def test_arrays_are_read_as_they_lie(self):
+        v, edges, faces = sheet(10, 3)
+        expected = all_pairs("edge_edge", v, edges, faces, 0.0)
+        wide = np.zeros((len(v), 7))
+        wide[:, 1:6:2] = v
+        for array in (v, np.asfortranarray(v), wide[:, 1:6:2], v[::-1].copy()[::-1], v.tolist()):
+            broad = kbvh.BroadPhase()
+            broad.build(array, np.asfortranarray(edges), faces.astype(np.uint16))
+            self.assertEqual(pairs(broad.candidates("edge_edge")), expected)
+        single = kbvh.BroadPhase("float32")
+        single.build(v.astype(np.float32), edges, faces)
+        self.assertGreater(len(single.candidates("edge_edge")), 100)
+
+    def test_moved_vertices_and_bounds(self):
+        v, edges, faces = sheet(12, 4)
+        broad = kbvh.BroadPhase()
+        broad.build(v, edges, faces, radius=0.125)
+        broad.candidates("face_face")
+        v[[5, 60]] += 0.25
+        broad.update(v, moved=[5, 60])
+        self.assertEqual(pairs(broad.candidates("face_face")), all_pairs("face_face", v, edges, faces, 0.125))
+        broad.valid_for(0.25)
+        before = broad.detections
+        kept = pairs(broad.candidates("edge_edge"))
+        broad.update(v + 0.125)
+        self.assertLessEqual(all_pairs("edge_edge", v + 0.125, edges, faces, 0.125), kept)
+        self.assertEqual(pairs(broad.candidates("edge_edge")), kept)
+        self.assertEqual(broad.detections, before + 1)
+        self.assertAlmostEqual(broad.left, 0.125)
+        broad.update(v + 0.5)
+        broad.candidates("edge_edge")
+        self.assertEqual(broad.detections, before + 2)
+
+
+class Errors(unittest.TestCase):
+    def test_name_what_is_wrong(self):
+        v, edges, faces = sheet(4, 5)
+        broad = kbvh.BroadPhase()
+        for wrong, call in (
+            ("before build", lambda: broad.candidates("edge_edge")),
+            ("face 0 names vertex 99 of 16", lambda: broad.build(v, edges, [[0, 1, 99]])),
+            ("shape .n, 2", lambda: broad.build(v, faces, faces)),
+            ("shape .n, 3", lambda: broad.build(v[:, :2], edges, faces)),
+            ("radius is -1", lambda: broad.build(v, edges, faces, radius=-1)),
+            ("no real numbers", lambda: broad.build([["a"]], edges, faces)),
+            ("float32 or float64", lambda: kbvh.BroadPhase("float16")),
+        ):
+            with self.assertRaisesRegex((ValueError, TypeError), wrong):
+                call()
+        broad.build(v, edges, faces, radius=0.5)
+        bad = v.copy()
+        bad[3, 1] = np.nan
+        for wrong, call in (
+            ("coordinate y of vertex 3 is nan", lambda: broad.update(bad)),
+            ("V1: coordinate y of vertex 3", lambda: broad.update(v, bad)),
+            ("15 rows for 16", lambda: broad.update(v[:15])),
+            ("vertex 16 moved", lambda: broad.update(v, moved=[16])),
+            ("not to a motion", lambda: broad.update(v, v, moved=[1])),
+            ("from 0 to the radius 0.5", lambda: broad.within("edge_edge", 0.75)),
+            ("edge_vertex", lambda: broad.candidates("vertex_edge")),
+        ):
+            with self.assertRaisesRegex(ValueError, wrong):
+                call()
+        self.assertEqual(pairs(broad.candidates("face_face")), all_pairs("face_face", v, edges, faces, 0.5))
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,308 @@
+// Kinetic AABB trees over curves: at frames, between frames and next to events every realiser is extremal in
+// rational arithmetic; all queues handle the same events in one order; seeded faults are found; and the
+// number of changes of a bound stays below that of Davenport-Schinzel sequences of order 2 and 3, which a
+// worst case reaches.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "core/families/events/algebraic_clock.hpp"
+#include "core/families/events/any_queue.hpp"
+#include "core/families/events/kinetic_forest.hpp"
+#include "core/topology/builders.hpp"
+#include "tests/support/curved_scenes.hpp"
+#include "tests/support/rational_curves.hpp"
+
+namespace kbvh::test::algebraic_clock_test {
+namespace {
+
+/// Seeded into the search for failures.
+enum class Fault : std::uint8_t {
+  none,
+  lost_event,   ///< one failure in 40 is not found
+  later_roots,  ///< roots after the first of a segment are not seen
+  end_points,   ///< the rule of lines: a certificate fails only if the loser is ahead at the segment's end
+  half_open,    ///< a failure at the very instant is not seen
+};
+
+template <Fault fault>
+struct Seeded {
+  template <class S>
+  class Clock : public AlgebraicClock<S> {
+    using Base = AlgebraicClock<S>;
+
+   public:
+    using Base::Base;
+    bool first_failure(Event& event, const typename Base::Now& now, std::optional<Crossing<S>>& crossing,
+                       double until = std::numeric_limits<double>::infinity()) const {
+      const bool found = Base::first_failure(event, now, crossing, until);
+      if (!found || fault == Fault::none || !this->on_curves(event.body)) return found;
+      if (fault == Fault::lost_event) return ++searches_ % 40 != 0;
+      if (fault == Fault::later_roots) return event.segment >> 30 == 0;
+      if (fault == Fault::end_points)
+        return this->compare_values(event.body, event.side, event.loser, event.winner, event.end) > 0;
+      return event.hint - event.error > now.end || now.exact == nullptr || event.begin > now.begin ||
+             compare_moments(this->crossing(event).moment, now.exact->moment) != 0;
+    }
+
+   private:
+    mutable std::uint32_t searches_ = 0;
+  };
+};
+
+struct HandledEvent {
+  double hint;
+  std::uint32_t body, node, side, winner, loser;
+  bool operator==(const HandledEvent&) const = default;
+};
+
+template <class S, template <class> class Clock>
+class Play {
+  using Forest = KineticForest<S, AnyEventQueue<Clock<S>>>;
+
+ public:
+  Play(const Scene<S>& scene, std::uint32_t width, std::uint32_t leaf_size, const std::string& queue)
+      : scene_(&scene),
+        view_(scene),
+        playback_(scene),
+        forest_(view_, ClipMotion<S>(playback_),
+                at_start({.method = BuildMethod::median, .width = width, .leaf_size = leaf_size}), count_) {
+    forest_.choose_queue(queue);
+    for (std::uint32_t body = 0; body < forest_.size(); ++body) {
+      const auto& tree = forest_.tree(body);
+      std::vector<std::vector<std::uint32_t>> below(tree.topology().size());
+      for (std::uint32_t node = tree.topology().size(); node-- > 0;) {
+        const auto leaf = tree.leaf_vertices(node);
+        below[node].insert(below[node].end(), leaf.begin(), leaf.end());
+        if (node == 0) continue;
+        auto& above = below[tree.topology().parents[node]];
+        above.insert(above.end(), below[node].begin(), below[node].end());
+      }
+      below_.push_back(std::move(below));
+    }
+  }
+
+  /// Plays the scene and checks at its frames and at `between` random times. Stops after 10 times as many
+  /// events as a sound play has: faulty clocks may not come to an end.
+  void run(int between, std::uint64_t seed, std::size_t most_events = 2000000) {
+    Random random(seed);
+    std::vector<double> times = frame_times(*scene_, 1);
+    const double first = times.front(), last = times.back();
+    for (int i = 0; i < between; ++i) times.push_back(first + (last - first) * (0.52 + 0.54 * random.unit()));
+    std::sort(times.begin(), times.end());
+    times.erase(std::unique(times.begin(), times.end()), times.end());
+    playback_.seek(times[0]);
+    forest_.reset(times[0]);
+    for (const double t : times) {
+      while (forest_.due(t) && events_.size() < most_events) {
+        const Event event = forest_.queue().top();
+        const auto& tree = forest_.tree(event.body);
+        events_.push_back(
+            {event.hint, event.body, tree.node_of(event.slot), event.side, event.winner, event.loser});
+        if (has_last_ && forest_.clock().compare_times(last_, event) > 0) ++out_of_order_;
+        last_ = event;
+        has_last_ = true;
+        forest_.handle_next();
+      }
+      check_realisers(t);
+    }
+  }
+  const std::vector<HandledEvent>& events() const { return events_; }
+  std::uint64_t not_extremal() const { return not_extremal_; }
+  std::uint64_t out_of_order() const { return out_of_order_; }
+  Forest& forest() { return forest_; }
+
+ private:
+  Topologies at_start(const BuilderConfig& config) { return build_topologies(view_, playback_, config); }
+  void check_realisers(double t) {
+    for (std::uint32_t body = 0; body < forest_.size(); ++body) {
+      const FlightPlans<S>& plans = playback_.plans(body);
+      const auto times = plans.keyframe_times();
+      const std::size_t k = plans.segment_at(t);
+      std::vector<Rational> values;
+      for (std::uint32_t v = 0; v < plans.vertex_count(); ++v)
+        for (int axis = 0; axis < 3; ++axis)
+          values.push_back(t <= times[k] || k + 1 == times.size()
+                               ? Rational(double(plans.keyframe(k)[3 * v + std::uint32_t(axis)]))
+                               : rational_value(plans.curved_piece(v, axis, k), Rational(t)));
+      const auto& tree = forest_.tree(body);
+      for (std::uint32_t node = 0; node < tree.topology().size(); ++node)
+        for (Side side = 0; side < 6; ++side) {
+          const std::size_t axis = direction_of(side);
+          const Rational& bound = values[3 * tree.realiser(node, side) + axis];
+          for (const std::uint32_t v : below_[body][node]) {
+            const int ahead = values[3 * v + axis].compare(bound);
+            if (is_upper(side) ? ahead > 0 : ahead < 0) {
+              ++not_extremal_;
+              break;
+            }
+          }
+        }
+    }
+  }
+
+  const Scene<S>* scene_;
+  SceneView<S> view_;
+  Playback<S> playback_;
+  Counters count_;
+  Forest forest_;
+  std::vector<std::vector<std::vector<std::uint32_t>>> below_;
+  std::vector<HandledEvent> events_;
+  Event last_;
+  bool has_last_ = false;
+  std::uint64_t not_extremal_ = 0, out_of_order_ = 0;
+};
+
+template <class S, Fault fault = Fault::none>
+using PlayOf = Play<S, Seeded<fault>::template Clock>;
+
+template <class S>
+void check_scene(const std::string& name) {
+  const Scene<S> scene = curved_scene<S>(name).scene;
+  std::vector<HandledEvent> events;
+  for (const std::string& queue : AnyEventQueue<AlgebraicClock<S>>::names()) {
+    PlayOf<S> play(scene, 2, 1, queue);
+    play.run(queue == "avl" ? 8 : 0, 5);
+    EXPECT_EQ(play.not_extremal(), 0u) << name << ", " << queue;
+    EXPECT_EQ(play.out_of_order(), 0u) << name << ", " << queue;
+    if (queue == AnyEventQueue<AlgebraicClock<S>>::names()[0])
+      events = play.events();
+    else
+      EXPECT_TRUE(events == play.events())
+          << name << ", " << queue << ": " << events.size() << " and " << play.events().size() << " events";
+  }
+  EXPECT_GT(events.size(), 10u) << name;
+  PlayOf<S> wide(scene, 8, 5, "");
+  wide.run(4, 6);
+  EXPECT_EQ(wide.not_extremal(), 0u) << name;
+}
+
+TEST(AlgebraicClock, RealisersAreExtremalAtAndBetweenFramesInFloat) {
+  for (const std::string& name : curved_scene_names()) check_scene<float>(name);
+}
+TEST(AlgebraicClock, RealisersAreExtremalAtAndBetweenFramesInDouble) {
+  for (const std::string& name : curved_scene_names()) check_scene<double>(name);
+}
+
+template <Fault fault>
+std::uint64_t found_faults() {
+  std::uint64_t found = 0;
+  for (const std::string name : {"curved_soups", "curved_ties", "curved_mirror"}) {
+    const Scene<float> scene = curved_scene<float>(name).scene;
+    PlayOf<float> sound(scene, 2, 1, "binary_heap");
+    sound.run(0, 5);
+    EXPECT_EQ(sound.not_extremal(), 0u);
+    PlayOf<float, fault> play(scene, 2, 1, "binary_heap");
+    play.run(4, 5, 10 * sound.events().size());
+    found += play.not_extremal();
+  }
+  return found;
+}
+
+TEST(AlgebraicClock, SeededFaultsAreFound) {
+  EXPECT_GT(found_faults<Fault::lost_event>(), 0u);
+  EXPECT_GT(found_faults<Fault::later_roots>(), 0u);
+  EXPECT_GT(found_faults<Fault::end_points>(), 0u);
+  EXPECT_GT(found_faults<Fault::half_open>(), 0u);
+}
+
+/// One primitive over n vertices that move along x in one segment: one leaf, whose upper x side is the upper
+/// envelope of n curves.
+template <class S, class Make>
+Scene<S> one_leaf(std::uint32_t n, const Make& make) {
+  Scene<S> scene;
+  Body<S> body;
+  body.primitives.kind = PrimitiveKind::control_nets;
+  std::vector<std::uint32_t> all(n);
+  std::vector<S> positions(std::size_t(6) * n, S(0));
+  SegmentBends<S> bends{std::vector<S>(std::size_t(3) * n, S(0)), std::vector<S>(std::size_t(3) * n, S(0))};
+  for (std::uint32_t v = 0; v < n; ++v) {
+    all[v] = v;
+    const CurvedPiece<S> piece = make(v);
+    positions[3 * v] = piece.x0;
+    positions[3 * (n + v)] = piece.x1;
+    bends.bend[3 * v] = piece.bend;
+    bends.twist[3 * v] = piece.twist;
+  }
+  body.primitives.add(all);
+  body.plans = FlightPlans<S>(n, {0, 1}, std::move(positions), {bends});
+  scene.bodies.push_back(std::move(body));
+  return scene;
+}
+
+/// Returns the number of failures of the only node's certificate, by side.
+template <class S>
+std::vector<std::size_t> failures_by_side(const Scene<S>& scene) {
+  PlayOf<S> play(scene, 2, 1, "");
+  play.run(20, 7);
+  EXPECT_EQ(play.not_extremal(), 0u);
+  std::vector<std::size_t> failures(6, 0);
+  for (const HandledEvent& event : play.events()) ++failures[event.side];
+  return failures;
+}
+
+/// The length of the longest Davenport-Schinzel sequence of order 1 or 2, and an upper bound for order 3
+/// (Sharir & Agarwal 1995): some symbol occurs at most l(n) / n times, and without it at most two neighbours
+/// are equal, so that l(n) <= l(n - 1) + l(n) / n + 2.
+std::size_t most_of_order(int order, std::uint32_t n) {
+  if (order == 1) return n;
+  if (order == 2) return 2 * n - 1;
+  double sum = 1;
+  for (std::uint32_t i = 1; i < n; ++i) sum += 2.0 / i;
+  return std::size_t(n * sum + 1e-9);
+}
+
+TEST(DavenportSchinzel, RandomCurvesStayBelowTheBound) {
+  Random random(8);
+  for (int order = 1; order <= 3; ++order)
+    for (const std::uint32_t n : {2u, 5u, 20u, 60u}) {
+      std::size_t most = 0;
+      for (int round = 0; round < 6; ++round) {
+        const auto failures = failures_by_side(one_leaf<double>(n, [&](std::uint32_t) {
+          return CurvedPiece<double>{0,
+                                     1,
+                                     0.2 * random.unit(),
+                                     0.2 * random.unit(),
+                                     order > 1 ? random.unit() : 0,
+                                     order > 2 ? 3 * random.unit() : 0};
+        }));
+        for (const Side side : {0u, 1u}) {
+          EXPECT_LE(failures[side] + 1, most_of_order(order, n)) << "order " << order << ", n = " << n;
+          most = std::max(most, failures[side]);
+        }
+        EXPECT_EQ(failures[2] + failures[3] + failures[4] + failures[5], 0u);
+      }
+      EXPECT_GT(most, 0u);
+    }
+}
+
+// A line, and narrow parabolas that rise above it one after the other: 1 2 1 3 1 4 ... 1.
+TEST(DavenportSchinzel, ParabolasReachTheBoundOfOrderTwo) {
+  for (const std::uint32_t n : {2u, 10u, 50u, 200u}) {
+    const auto failures = failures_by_side(one_leaf<double>(n, [&](std::uint32_t v) {
+      if (v == 0) return CurvedPiece<double>{};
+      const double gaps = n - 1, top = (v - 0.5) / gaps, height = 0.09 / (gaps * gaps);
+      return CurvedPiece<double>{0, 1, height - top * top, height - (1 - top) * (1 - top), 1, 0};
+    }));
+    EXPECT_EQ(failures[1] + 1, most_of_order(2, n)) << n;
+    EXPECT_LE(failures[0] + 1, most_of_order(2, n)) << n;
+  }
+}
+
+// Two cubics that meet three times, and a third that is behind: order 3 is reached for n = 2.
+TEST(DavenportSchinzel, TwoCubicsCrossThreeTimes) {
+  // (s - 1/4) (s - 1/2) (s - 3/4) = s^3 - 3/2 s^2 + 11/16 s - 3/32
+  const auto failures = failures_by_side(one_leaf<float>(3, [](std::uint32_t v) {
+    if (v == 0) return CurvedPiece<float>{};
+    if (v == 2) return CurvedPiece<float>{0, 1, -1, -1, 0, 0};
+    return CurvedPiece<float>{0, 1, -3.0F / 32, 3.0F / 32, 0.5F, -1};
+  }));
+  EXPECT_EQ(failures[1], 3u);
+}
+
+}  // namespace
+}  // namespace kbvh::test::algebraic_clock_test
