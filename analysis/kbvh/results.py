@@ -12,7 +12,9 @@ import pandas as pd
 
 from .scenes import PathLike
 
-_SHARED = ("files", "scene_names", "clip_times", "load", "ratios", "profiles")
+_SHARED = (
+    "results", "results.files", "results.scene_names", "results.clip_times", "results.load", "ratios", "ratios.ratios", "ratios.profiles",
+)  # fmt: skip
 
 
 def _shared(name: str) -> ModuleType:
@@ -35,7 +37,7 @@ def _shared(name: str) -> ModuleType:
 
 
 def _reader() -> ModuleType:
-    return _shared("load")
+    return _shared("results.load")
 
 
 class Results:
@@ -72,7 +74,7 @@ class Results:
         with_motion, without_motion, update or query. Runs without a reference are left out. The report and its explorer show the
         same numbers. Raises ValueError for another measure.
         """
-        rules = _shared("ratios")
+        rules = _shared("ratios.ratios")
         if measure not in rules.SCOPES:
             raise ValueError(f"measure is {measure!r}, but should be one of {', '.join(rules.SCOPES)}")
         rows = []
@@ -96,7 +98,7 @@ class Results:
         at one size, scalar and l), and its median `factor`. Contestants without a guarantee, with several threads, brute force and
         limits take no part, and cells with a single strategy do not count.
         """
-        found = _shared("profiles").profiles(self._study)
+        found = _shared("ratios.profiles").profiles(self._study)
         rows = {
             one.id: {
                 **{f"within {factor:g}": one.within(factor) for factor in within},

@@ -8,8 +8,8 @@ import re
 from pathlib import Path
 from typing import Any
 
-import advice
-import load
+from advice import advice
+from results import load
 
 #: Cells shown on a page: so many of the best, and of the worst.
 SHOWN = 6

@@ -252,7 +252,7 @@ bool World::hierarchy(std::uint32_t body, WorldHierarchy& out) const {
         made.upper[axis] = view->boxes[i].upper[axis];
       }
     }
-    // The view numbers the nodes of an edited tree anew; children keep their order.
+    // The view renumbers the nodes of an edited tree; children keep their order.
     if (source != nullptr)
       for (WorldNode& node : out.nodes)
         for (std::uint32_t i = 0; !node.leaf && i < node.count; ++i)

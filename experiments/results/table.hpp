@@ -41,7 +41,7 @@ bool is_baseline(const nlohmann::json& record);
 /// Returns the time of the contestant's whole clip, in ms per frame, by which the best refit and the best of
 /// several configurations are chosen: the median over repetitions of all phases. The evaluation of positions
 /// counts: some baselines fetch them in their own phases. The record must have times. `clip_total` of
-/// analysis/ratios.py is the same number; tests compare the choices.
+/// analysis/ratios/ratios.py is the same number; tests compare the choices.
 double clip_total(const nlohmann::json& record);
 
 /// Returns the record with the smallest `clip_total`, the first of equal ones; nullptr if none has times.

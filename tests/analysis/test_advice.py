@@ -10,10 +10,10 @@ from typing import Any
 
 import paths
 
-import advice
-import ageing
+from advice import advice
+from ratios import ageing
 import synthetic
-from load import ResultError, Study, load
+from results.load import ResultError, Study, load
 from synthetic import line
 
 

@@ -11,12 +11,12 @@ import paths  # noqa: F401  (finds the modules under test)
 import synthetic
 from test_claims import WORLD, Line, line
 
-import break_even
-import claims
-import load
-import report
-from break_even import AHEAD, BEHIND, CROSSES, MIXED
-from claim_points import Table
+from claims import claims
+from claims.claim_points import Table
+from figures import break_even
+from figures.break_even import AHEAD, BEHIND, CROSSES, MIXED
+from report import report
+from results import load
 
 PERIOD, BEST = "2006-style refit", "best refit"
 

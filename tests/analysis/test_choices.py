@@ -9,9 +9,9 @@ from typing import Any
 
 import paths  # noqa: F401  (finds the modules under test)
 
-import choices
+from ratios import choices
 import synthetic
-from load import load
+from results.load import load
 from synthetic import line
 
 

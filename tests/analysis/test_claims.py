@@ -14,11 +14,11 @@ from typing import Any, Optional
 import paths  # noqa: F401  (finds the modules under test)
 import synthetic
 
-import claims
-import load
-import paper_figures
+from claims import claims
+from figures import paper_figures
+from results import load
 import plan_cost
-import report
+from report import report
 
 Line = dict[str, Any]
 Where = Callable[[Line], bool]

@@ -19,11 +19,9 @@ from typing import Any, Callable
 import paths
 import synthetic
 
-import files
-import load
-import report
-import scene_cards
-import scene_pictures
+from figures import scene_pictures
+from report import report, scene_cards
+from results import files, load
 
 
 def small() -> list[dict[str, Any]]:

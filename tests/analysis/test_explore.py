@@ -17,14 +17,12 @@ from unittest import mock
 import paths  # noqa: F401  (finds the modules under test)
 import synthetic
 
-import colours
-import explore
-import explorer_data
-import clip_times
-import load
+from explorer import explore, explorer_data
+from figures import colours
+from results import clip_times, load
 import numpy as np
-import profiles
-import report
+from ratios import profiles
+from report import report
 
 
 def line(id: str, times: list[float], scene: str = "s", **strategy: Any) -> dict[str, Any]:
@@ -158,7 +156,7 @@ class TestProgram(Folder):
 
     def answer(self, program: str) -> Any:
         """Returns what a module prints as JSON; `data` is the data of the page, `src` the folder of the page's modules."""
-        src = (Path(explore.__file__).parent / "explorer" / "src").as_uri()
+        src = (Path(explore.__file__).parent / "src").as_uri()
         data = json.dumps(explorer_data.data(load.load(self.folder), "", None, self.folder))
         text = f"const data = {data};\n" + program.replace("SRC", src)
         told = subprocess.run(["node", "--input-type=module"], input=text, capture_output=True, text=True)

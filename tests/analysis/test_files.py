@@ -7,7 +7,7 @@ import unittest
 
 import paths  # noqa: F401  (finds the modules under test)
 
-import files
+from results import files
 
 
 class TestFiles(unittest.TestCase):

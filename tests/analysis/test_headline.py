@@ -10,9 +10,9 @@ from typing import Any
 import paths  # noqa: F401  (finds the modules under test)
 import synthetic
 
-import headline
-import load
-from load import ResultError
+from report import headline
+from results import load
+from results.load import ResultError
 
 
 def line(id: str, scene: str, l: int, update: float, query: float, motion: float = 0.0, **strategy: Any) -> dict[str, Any]:
@@ -106,7 +106,7 @@ class TestHeadline(unittest.TestCase):
             headline.strategies(self.cases(lines()[-2:]), headline.SHORT)
 
     def test_readme_and_guide_have_their_tables(self) -> None:
-        root = Path(headline.__file__).resolve().parents[1]
+        root = Path(headline.__file__).resolve().parents[2]
         for page, names in (("README.md", ("short", "cases")), ("analysis/guides/results.md", ("whole", "cases"))):
             content = (root / page).read_text(encoding="utf-8")
             for name in names:

@@ -10,9 +10,8 @@ import pandas as pd
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-import colours
-import figures
-import text
+from figures import colours, figures
+from results import text
 
 
 class TestLooks(unittest.TestCase):

@@ -13,12 +13,11 @@ from typing import Any
 import paths  # noqa: F401  (finds the modules under test)
 import synthetic
 
-import clip_times
-import load
+from results import clip_times, load
 import numpy as np
 import pandas as pd
-import ratios
-import tables
+from ratios import ratios
+from report import tables
 
 #: The first resamples of five repetitions.
 PINNED: list[list[int]] = [[2, 3, 4, 2, 2], [3, 4, 2, 1, 3], [2, 3, 2, 2, 2]]

@@ -9,9 +9,8 @@ from pathlib import Path
 
 import paths
 
-import agree
-import claims
-from load import load
+from claims import agree, claims
+from results.load import load
 
 REFERENCE = paths.HERE.parents[1] / "analysis" / "reference"
 

@@ -15,7 +15,7 @@ from typing import Any, Optional
 import paths  # noqa: F401  (finds the modules under test)
 import synthetic
 
-import report
+from report import report
 
 
 def small() -> list[dict[str, Any]]:

@@ -10,8 +10,8 @@ from typing import Any
 
 import paths  # noqa: F401  (finds the modules under test)
 
-import robustness
-from load import ResultError
+from ratios import robustness
+from results.load import ResultError
 
 
 def row(family: str, strategy: str, **changes: Any) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from pathlib import Path
 import paths  # noqa: F401  (finds the modules under test)
 
 import numpy as np
-import scene_pictures
+from figures import scene_pictures
 
 
 def square(x: float) -> np.ndarray:

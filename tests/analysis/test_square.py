@@ -15,12 +15,10 @@ import paths  # noqa: F401  (finds the modules under test)
 import synthetic
 from test_claims import Line, Where, both, l_of, line, of, times
 
-import claim_pictures
-import claim_words
-import claims
-import load
+from claims import claim_pictures, claim_words, claims
+from results import load
 import plan_cost
-import report
+from report import report
 
 STRUCTURES = ("kinetic_aabb", "kinetic_boxtree", "kinetic_separation_list")
 QUARTERS = ("2006:2006", "best:2006", "best:best", "any:2006", "any:best")

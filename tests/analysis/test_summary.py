@@ -13,11 +13,10 @@ import synthetic
 from synthetic import line
 from test_advice import other
 
-import advice
-import claims
-import summary
-import time_error
-from load import Study, load
+from advice import advice, summary
+from claims import claims
+from figures import time_error
+from results.load import Study, load
 
 
 def row(id: str, verdict: str) -> claims.Row:

@@ -14,8 +14,7 @@ from typing import Any, Optional
 import paths  # noqa: F401  (finds the modules under test)
 import synthetic
 
-import report
-import targets_table
+from report import report, targets_table
 
 
 def scene(name: str, ratio: Optional[float], counts: bool, **others: Any) -> dict[str, Any]:

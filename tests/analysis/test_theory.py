@@ -15,7 +15,7 @@ import paths  # noqa: F401  (finds the modules under test)
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-import theory_figures
+from figures import theory_figures
 
 
 def count(scene: str, n: int, events: int) -> dict[str, Any]:

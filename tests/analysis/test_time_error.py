@@ -12,10 +12,10 @@ from typing import Any
 
 import paths  # noqa: F401  (finds the modules under test)
 
-import report
+from report import report
 import synthetic
-import time_error
-from load import Study, load
+from figures import time_error
+from results.load import Study, load
 from synthetic import line
 
 WRONG = dict(guarantee="approximate", tightness="none")

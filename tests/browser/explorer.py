@@ -56,10 +56,9 @@ def main() -> int:
 
 def write(folder: Path, with_claims: bool = True) -> Any:
     """Writes the pages of a folder, its report included unless without claims; returns its study."""
-    import explore
-    import explorer_data
-    import report
-    from load import ONE_OF_EACH_COMMIT, load
+    from explorer import explore, explorer_data
+    from report import report
+    from results.load import ONE_OF_EACH_COMMIT, load
 
     study = load(folder, ONE_OF_EACH_COMMIT)
     if with_claims:
@@ -81,10 +80,9 @@ def described(found: Any) -> Optional[list[Any]]:
 
 def expectations(folder: Path, study: Any) -> dict[str, Any]:
     """Returns what the page should compute."""
-    import advice
-    import profiles
-    import ratios
-    from load import load
+    from advice import advice
+    from ratios import profiles, ratios
+    from results.load import load
 
     runs = study.runs
     usual = set(profiles.contestants(runs)["run"])
@@ -139,7 +137,7 @@ def reference(place: Path) -> dict[str, Any]:
 
 def merged(place: Path, program: str) -> dict[str, Any]:
     """Two commits on one machine, and one of them on another machine, added up by `kbvh merge`."""
-    import ratios
+    from ratios import ratios
     import synthetic
 
     sources = [("one", "a" * 40, "Invented CPU", 0), ("two", "b" * 40, "Invented CPU", 1), ("three", "b" * 40, "Another CPU", 2)]

@@ -84,8 +84,8 @@ class Asker:
 
     def commands(self, out: str, what: str) -> list[str]:
         """The explorer's commands for the records of a folder, in their order."""
-        import explorer_data
-        from load import load
+        from explorer import explorer_data
+        from results.load import load
 
         data = json.dumps(explorer_data.data(load(self.folder / out), "", None, self.folder / out))
         src = (ROOT / "analysis" / "explorer" / "src").as_uri()

@@ -88,7 +88,7 @@ TEST(Table, DisturbedRatiosLookDifferent) {
       << table;
 }
 
-// A refit of one's own is shown in the table, and no ratio is against it unless it is declared a baseline.
+// A user's own refit is shown in the table, but no ratio refers to it unless it is declared a baseline.
 TEST(Table, OnlyDeclaredBaselinesAreTheDenominator) {
   std::vector<json> records{example_record("mine", "refit", 1), example_record("bottom_up", "refit", 4),
                             example_record("new", "other", 2)};

@@ -1,4 +1,4 @@
-// Which strategy for what: the rule of analysis/advice.py, which words it; a test compares both.
+// Which strategy for what: the rule of analysis/advice/advice.py, which words it; a test compares both.
 import { bestRefit, compare, value } from "./model.js";
 import { geometricMean, quotient } from "./statistics.js";
 
@@ -87,7 +87,7 @@ export function ranked(model, cells, known) {
   return found;
 }
 
-/** Returns what the rule takes in every situation, as analysis/advice.py lists them. */
+/** Returns what the rule takes in every situation, as analysis/advice/advice.py lists them. */
 export function situations(model) {
   const cells = countedCells(model);
   const kinds = [...new Set(cells.map(({ cell }) => cell.asks))];

@@ -4,7 +4,7 @@ import { make, paintOf, symbol } from "./dom.js";
 import { quantile } from "./statistics.js";
 import { tick } from "./words.js";
 
-/** Returns a marker for Plot, as analysis/colours.py draws it. */
+/** Returns a marker for Plot, as analysis/figures/colours.py draws it. */
 export function marker(contestant) {
   const { corners } = contestant.look;
   return {

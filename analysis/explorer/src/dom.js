@@ -17,7 +17,7 @@ export function make(name, attributes = {}, ...children) {
   return element;
 }
 
-/** Makes the marker of a contestant, as analysis/colours.py draws it. */
+/** Makes the marker of a contestant, as analysis/figures/colours.py draws it. */
 export function symbol(contestant) {
   const { corners, filled } = contestant.look;
   const paint = {

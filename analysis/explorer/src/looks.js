@@ -1,4 +1,4 @@
-// Colours and markers of contestants that the page was not made with, as analysis/colours.py chooses them.
+// Colours and markers of contestants that the page was not made with, as analysis/figures/colours.py chooses them.
 
 const channels = (colour) => [1, 3, 5].map((i) => parseInt(colour.slice(i, i + 2), 16));
 

@@ -175,7 +175,7 @@ export function seriesOfName(model, state, name) {
   return { name, contestant: first, label: state.per === "each" ? first.label : first.title };
 }
 
-/** Returns the time of a run's whole clip, by which the best refit is chosen: `clip_total` of analysis/ratios.py. */
+/** Returns the time of a run's whole clip, by which the best refit is chosen: `clip_total` of analysis/ratios/ratios.py. */
 export function clipTotal(model, run) {
   return value(model, run, "with_motion");
 }

@@ -1,4 +1,4 @@
-// Numbers for readers, as analysis/text.py formats them.
+// Numbers for readers, as analysis/results/text.py formats them.
 
 const THIN = "\u202f";
 

@@ -87,7 +87,7 @@ function questions({ state, set }, found) {
   );
 }
 
-/** Tells the speed of a strategy, as analysis/advice.py does. */
+/** Tells the speed of a strategy, as analysis/advice/advice.py does. */
 export function speedText(one) {
   const missing = one.own.length < one.cells ? `, measured in ${one.own.length}` : "";
   if (one.contestant.baseline && !one.bestIn) {

@@ -28,7 +28,7 @@ export function claims({ model }) {
     }),
     ...decided.map((one) => {
       const picture = make("div", { class: "drawn" });
-      picture.innerHTML = one.picture; // made by analysis/claim_pictures.py
+      picture.innerHTML = one.picture; // made by analysis/claims/claim_pictures.py
       return make(
         "article",
         { class: "claim", id: `claim-${one.id}` },

@@ -1,0 +1,1 @@
+"""Which strategy for what: the rule, and the sentences at the top of a report."""

@@ -1,0 +1,303 @@
+"""Which strategy for what, by one rule over the cells of a study: for the report, its lines on the terminal, the guide and the site.
+
+A cell is one scene at one size, scalar and l, as measured by one program on one machine. Strategies with a guarantee and one thread take
+part, each with its fastest setting of the cell; a cell without a refit, or with a single strategy, is left out. A strategy's speed
+in a cell is the time of the best refit over its own, of whole clips, positions included. A situation is the knowledge of the future, the
+frames from one keyframe to the next, and the question asked. **The rule:** of the strategies that need to know no more than is known, and
+were measured in at least half of the situation's cells, take the one with the largest geometric mean of its speeds; a cell in which it
+was not measured counts as its slowest. The explorer uses the same rule (explorer/src/advice.js), and a test compares the two.
+
+usage: advice.py RESULTS_DIR [--write PAGE]     prints the table, or puts it between `<!-- advice -->` and `<!-- /advice -->`
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Optional
+
+import pandas as pd
+
+from ratios import profiles, ratios
+from results import clip_times, files, text
+from results.load import ResultError, Study, load
+
+#: What a strategy may know about motion, from least to most.
+FORESIGHT: dict[str, tuple[str, ...]] = {
+    "nothing is known": ("", "none"),
+    "the next keyframe is known": ("", "none", "step_bound", "next_keyframe"),
+    "the whole clip is known": ("", "none", "step_bound", "next_keyframe", "whole_clip"),
+}
+
+#: Frames from one keyframe to the next, with the first l of each class and the first beyond it.
+FRAMES: dict[str, tuple[float, float]] = {
+    "a keyframe at every frame": (0, 2),
+    "2 to 9 frames a keyframe": (2, 10),
+    "10 frames a keyframe and more": (10, math.inf),
+}
+
+#: What is asked of a cell (`asked`), in the order of pages.
+PAIRS, SELF = "pairs of two bodies", "pairs within a body, too"
+
+
+def asked(row: Any) -> str:
+    """Returns what a cell asks for, from the record of one of its contestants."""
+    if row["rays"]:
+        return "rays"
+    if row["continuous"]:
+        return "contacts between keyframes"
+    if row["answer"]:
+        return f"changes of {row['answer']}"
+    if row["changes"]:
+        return "pairs while plans change"
+    within = any(isinstance(body, dict) and body.get("self") is True for body in row["bodies"])
+    return SELF if within else PAIRS
+
+
+def frames_of(l: float) -> str:
+    """Returns the class of FRAMES that an l belongs to."""
+    return next(name for name, (low, high) in FRAMES.items() if low <= l < high)
+
+
+@dataclass
+class Cell:
+    """One scene at one size, scalar and l."""
+
+    title: str
+    asks: str
+    frames: str
+    refit: int  #: run of the best refit
+    runs: dict[str, int]  #: by strategy: its fastest setting
+    speeds: dict[str, float]  #: by strategy: times as fast as the best refit
+    contestants: dict[str, str]
+    row: pd.Series  #: of the best refit
+
+    def share(self, id: str) -> float:
+        """Returns the time of the fastest over that of a strategy."""
+        return self.speeds[id] / max(self.speeds.values())
+
+    def best(self, ids: Iterable[str]) -> Optional[str]:
+        """Returns the fastest of some strategies; None if none of them was measured."""
+        known = [id for id in ids if id in self.speeds]
+        return max(known, key=lambda id: (self.speeds[id], id)) if known else None
+
+
+@dataclass
+class Advice:
+    """The strategy that the rule chooses in one situation."""
+
+    id: str
+    title: str
+    baseline: bool
+    speed: float  #: geometric mean, over the best refit
+    low: float  #: ends of the interval of the ratio in a single cell (the range of its rounds, if few), or of its range over several
+    high: float
+    cells: int  #: of the situation
+    measured: int  #: of these, in which it was measured
+    worst: str  #: the title of the cell with its lowest speed
+    best_in: int  #: of a refit: cells in which it is the best refit
+    disturbed: bool = False
+    is_interval: bool = False  #: in a single cell: of at least five rounds
+
+    @property
+    def says(self) -> str:
+        """Writes the speed out, as in "1.6 times as fast as the best refit (0.9 to 2.1 in 8 cells)"."""
+        missing = f", measured in {self.measured}" if self.measured < self.cells else ""
+        if self.baseline and not self.best_in:
+            span = text.factor(self.low) + (f" to {text.factor(self.high)}" if self.low < self.high else "")
+            return f"a refit, {span} times as fast as the best one of the {'cell' if self.cells == 1 else 'cells'}{missing}"
+        if self.baseline:
+            where = "in the only cell" if self.cells == 1 else f"in {self.best_in} of {text.plural(self.cells, 'cell')}"
+            worst = f"; at worst {text.factor(self.low)} times as fast as that one" if self.best_in < self.cells else ""
+            return f"the best refit {where}{worst}{missing}"
+        span = f"{text.factor(self.low)} to {text.factor(self.high)}" if self.low < self.high else ""
+        of = f"{span} in {text.plural(self.cells, 'cell')}".lstrip()
+        if span and self.cells == 1:
+            of = ("95\u00a0% interval " if self.is_interval else "range of its rounds ") + span
+        doubt = "; the machine was disturbed" if self.disturbed else ""
+        return f"{text.factor(self.speed)} times as fast as the best refit ({of}{missing}{doubt})"
+
+
+@dataclass
+class Situation:
+    """What is asked and how many frames a keyframe has, with the advice by what is known."""
+
+    asks: str
+    frames: str
+    cells: int
+    advice: list[tuple[str, Optional[Advice]]]  #: in the order of FORESIGHT
+
+
+@dataclass
+class Record:
+    """How one strategy did in the whole study."""
+
+    cells: int = 0
+    fastest: list[str] = field(default_factory=list)  #: titles of the cells in which nothing was faster
+    near: int = 0  #: cells in which it is within a tenth of the fastest
+    share: float = math.nan  #: geometric mean of the fastest time over its own
+    worst: float = math.nan
+    worst_cell: str = ""
+
+
+def cells(study: Study) -> list[Cell]:
+    """Returns the cells of a study, in the order of its groups."""
+    found = []
+    timed = profiles.contestants(study.timed)
+    for _, rows in timed.groupby(["group", "commit", "dirty"], sort=False):
+        refit = ratios.best_refit(study, rows)
+        best = rows.sort_values(["total_motion", "run"]).drop_duplicates("id")
+        if refit is None or len(best) < 2:
+            continue
+        row = rows[rows["run"] == refit].iloc[0]
+        speeds = {str(one.id): _speed(study, int(one.run), refit) for one in best[["id", "run"]].itertuples()}
+        found.append(
+            Cell(
+                _title(row), asked(row), frames_of(float(row["l"])), refit, dict(zip(best["id"], map(int, best["run"]))), speeds,
+                dict(zip(best["id"], best["contestant"])), row,
+            )  # fmt: skip
+        )
+    return found
+
+
+def _speed(study: Study, run: int, refit: int) -> float:
+    """Returns the middle of ratios.ratio, without its interval."""
+    own, other = study.raw[run], study.raw[refit]
+    by_clips = own.by_clips or other.by_clips
+    top, bottom = (clip_times.time_of(side, ratios.SCOPES["with_motion"], by_clips) for side in (other, own))
+    return top / bottom if bottom > 0 else math.nan
+
+
+def situations(study: Study, every: Optional[Sequence[Cell]] = None) -> list[Situation]:
+    """Returns the advice for each situation that the study has cells of: pairs of two bodies first."""
+    every = cells(study) if every is None else every
+    kinds = list(dict.fromkeys([PAIRS, SELF, *(cell.asks for cell in every)]))
+    found = []
+    for asks in kinds:
+        for frames in FRAMES:
+            own = [cell for cell in every if (cell.asks, cell.frames) == (asks, frames)]
+            if own:
+                found.append(Situation(asks, frames, len(own), [(known, advise(study, own, known)) for known in FORESIGHT]))
+    return found
+
+
+def allowed(study: Study, known: str) -> list[str]:
+    """Returns the strategies that need to know no more than `known`, a key of FORESIGHT."""
+    unique = study.runs.drop_duplicates("id")
+    return sorted(unique.loc[unique["foresight"].isin(FORESIGHT[known]), "id"])
+
+
+def advise(study: Study, own: Sequence[Cell], known: str) -> Optional[Advice]:
+    """Applies the rule to the cells of one situation; None if no strategy was measured in half of them."""
+    best: Optional[str] = None
+    most = -math.inf
+    for id in allowed(study, known):
+        speeds = [cell.speeds[id] for cell in own if id in cell.speeds]
+        if not speeds or 2 * len(speeds) < len(own):
+            continue
+        mean = geometric_mean(speeds + [min(speeds)] * (len(own) - len(speeds)))
+        if mean > most:
+            best, most = id, mean
+    if best is None:
+        return None
+    measured = [cell for cell in own if best in cell.speeds]
+    worst = min(measured, key=lambda cell: cell.speeds[best])
+    first = study.runs[study.runs["id"] == best].iloc[0]
+    low, high = worst.speeds[best], max(cell.speeds[best] for cell in measured)
+    is_interval = False
+    if len(own) == 1:
+        found = ratios.ratio(study, own[0].runs[best], own[0].refit, "with_motion")
+        low, high, is_interval = (found.low, found.high, found.is_interval) if found else (low, high, False)
+    disturbed = any(ratios.is_disturbed(study, cell.runs[best], cell.refit) for cell in measured)
+    return Advice(
+        best, str(first["title"]), bool(first["baseline"]), most, low, high, len(own), len(measured), worst.title,
+        sum(cell.refit == cell.runs[best] for cell in measured), disturbed, is_interval,
+    )  # fmt: skip
+
+
+def records(every: Sequence[Cell]) -> dict[str, Record]:
+    """Returns the record of every strategy with a time in some cell."""
+    result: dict[str, Record] = {}
+    shares: dict[str, list[float]] = {}
+    for cell in every:
+        for id in cell.speeds:
+            share = cell.share(id)
+            record = result.setdefault(id, Record())
+            record.cells += 1
+            record.near += share >= 1 / 1.1
+            if share == 1:
+                record.fastest.append(cell.title)
+            if not share >= record.worst:
+                record.worst, record.worst_cell = share, cell.title
+            shares.setdefault(id, []).append(share)
+    for id, record in result.items():
+        record.share = geometric_mean(shares[id])
+    return result
+
+
+def geometric_mean(values: Sequence[float]) -> float:
+    """Returns the geometric mean of positive values."""
+    return math.exp(sum(map(math.log, values)) / len(values))
+
+
+def _title(row: pd.Series) -> str:
+    scalar = "" if row["scalar"] == "float" else f", {row['scalar']}"
+    return f"{row['scene_name']}, {text.size(row['primitives'])}, l = {row['l']:g}{scalar}"
+
+
+def sentence(one: Situation) -> str:
+    """Writes the advice of a situation in one sentence; advice that more knowledge does not change is not repeated."""
+    parts: list[str] = []
+    last = ""
+    for known, best in one.advice:
+        if best is not None and best.id != last:
+            parts.append(f"{best.title} {'if' if parts else 'where'} {known}: {best.says}")
+            last = best.id
+    asks = {PAIRS: "", SELF: " and pairs within a body"}.get(one.asks, f" and {one.asks}")
+    return f"With {one.frames}{asks}, take {'; '.join(parts)}." if parts else f"With {one.frames}{asks}, no strategy was measured in half of the cells."
+
+
+def markdown(study: Study) -> str:
+    """Returns the advice as a table of Markdown."""
+    lines = ["| situation | cells | " + " | ".join(FORESIGHT) + " |", "|---|---|" + "---|" * len(FORESIGHT)]
+    for one in situations(study):
+        row = [f"{one.asks}, {one.frames}", str(one.cells)]
+        last = ""
+        for _, best in one.advice:
+            row.append(text.MISSING if best is None else "the same" if best.id == last else f"{best.title} (`{best.id}`): {best.says}")
+            last = best.id if best else ""
+        lines.append("| " + " | ".join(row) + " |")
+    return "\n".join(lines) + "\n"
+
+
+BEGIN, END = "<!-- advice -->\n", "<!-- /advice -->\n"
+
+
+def inserted(page: str, table: str, place: str) -> str:
+    """Returns a page with its table replaced. Raises ResultError for a page without a place for it."""
+    if page.count(BEGIN) != 1 or page.count(END) != 1 or page.index(END) < page.index(BEGIN):
+        raise ResultError(f"{place} should have the lines {BEGIN.strip()} and {END.strip()} once, in this order.")
+    return page.split(BEGIN)[0] + BEGIN + table + END + page.split(END)[1]
+
+
+def main(arguments: Optional[list[str]] = None) -> int:
+    """Runs the command; returns the exit code: 0, or 2 for unusable input."""
+    parser = argparse.ArgumentParser(prog="advice.py", description="Prints which strategy the results recommend for what.")
+    parser.add_argument("folder", metavar="RESULTS_DIR", type=Path, help="folder with results.jsonl")
+    parser.add_argument("--write", metavar="PAGE", type=Path, help="insert the table into this page")
+    options = parser.parse_args(arguments)
+
+    def work() -> int:
+        table = markdown(load(options.folder))
+        if options.write:
+            page = options.write.read_text(encoding="utf-8")
+            files.write_whole(options.write, inserted(page, table, str(options.write)))
+        else:
+            print(table, end="")
+        return 0
+
+    return files.run_command("advice", (ResultError,), work)

@@ -1,0 +1,274 @@
+"""The top of the report: five sentences and one small chart, computed; the command prints the same sentences."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Optional
+
+from advice import advice
+from advice.advice import Advice, Cell, Situation
+from claims import claims as paper_claims
+from claims.claims import CONDITION, FAILS, HOLDS, OPEN, Claims
+from figures import time_error
+from ratios import ratios
+from results import text
+from results.load import OLD_SCHEMA, Study
+
+REFERENCE = Path(__file__).resolve().parents[1] / "reference"
+#: The claim that the paper's abstract makes: kinetic trees are updated faster than by a refit.
+MAIN = "E3"
+HERE, BY_REFERENCE = "this study", "the reference run"
+
+
+@dataclass
+class Verdict:
+    """What is known of one claim of the paper."""
+
+    row: paper_claims.Row  #: of this study
+    reference: str  #: the verdict of the reference run, "" if it has none
+    reference_brief: str = ""
+    reference_corners: list[tuple[str, str]] = field(default_factory=list)
+
+    @property
+    def source(self) -> str:
+        """Returns which of the two decides it: this study if it can; "" if neither does."""
+        return HERE if self.row.verdict != OPEN else BY_REFERENCE if self.reference else ""
+
+    @property
+    def verdict(self) -> str:
+        return self.row.verdict if self.source != BY_REFERENCE else self.reference
+
+    @property
+    def brief(self) -> str:
+        return self.row.brief if self.source != BY_REFERENCE else self.reference_brief
+
+    @property
+    def corners(self) -> list[tuple[str, str]]:
+        """Returns the corners of the claim's square, each with the range that was measured, without motion evaluation."""
+        return _ranges([asdict(one) for one in self.row.corners], self.row.ours) if self.source == HERE else self.reference_corners
+
+    @property
+    def differs(self) -> bool:
+        """Returns whether both decide it and disagree."""
+        return self.source == HERE and bool(self.reference) and self.reference != self.row.verdict
+
+
+@dataclass
+class Paper:
+    """What is known of the paper's claims, and of the reference run that stands in for what a study does not decide."""
+
+    verdicts: list[Verdict]
+    reference: str  #: machine and day of the reference run; "" where it takes no part
+
+    @property
+    def tally(self) -> list[tuple[str, int, int]]:
+        """Returns verdict, claims that this study decides, and claims that the reference run decides."""
+        rows = []
+        for verdict in (HOLDS, CONDITION, FAILS, OPEN):
+            mine = [one for one in self.verdicts if one.verdict == verdict]
+            rows.append((verdict, sum(one.source != BY_REFERENCE for one in mine), sum(one.source == BY_REFERENCE for one in mine)))
+        return rows
+
+
+def paper(claims: Claims, folder: Path, reference: Path = REFERENCE) -> Paper:
+    """Adds the verdicts of the reference run, if it comes with the program and is not itself the subject of the report."""
+    known: dict[str, dict[str, str]] = {}
+    about = ""
+    file = reference / "claims.json"
+    if file.exists() and folder.resolve() != reference.resolve():
+        known = {one["id"]: one for one in json.loads(file.read_text(encoding="utf-8"))["claims"] if one["verdict"] != OPEN}
+        with (reference / "results.jsonl").open(encoding="utf-8") as lines:
+            first = json.loads(next(lines))
+        about = f"{first['machine']['cpu']}, {first['when'][:10]}, commit {first['commit'][:8]}"
+    verdicts = []
+    for row in claims.rows:
+        one = known.get(row.id, {})
+        corners = _ranges(one.get("corners", []), one.get("ours", {}))
+        verdicts.append(Verdict(row, one.get("verdict", ""), one.get("brief", ""), corners))
+    return Paper(verdicts, about)
+
+
+def _ranges(corners: Sequence[dict[str, Any]], ours: dict[str, str]) -> list[tuple[str, str]]:
+    return [(one["name"], ours[one["id"]].split(",")[0]) for one in corners if one["id"] in ours]
+
+
+def on_the_paper(found: Paper) -> str:
+    """Answers whether the paper holds: by this study where it decides, else by the reference run."""
+    counts = {verdict: here + there for verdict, here, there in found.tally}
+    decided = [one for one in found.verdicts if one.source]
+    if not decided:
+        return "Does the paper hold? These results decide none of its claims, and no reference run comes with this program."
+    parts = [f"{counts[HOLDS]} hold", f"{counts[CONDITION]} hold with a condition", f"{counts[FAILS]} do not hold"]
+    parts += [f"{counts[OPEN]} are open"] if counts[OPEN] else []
+    here = [one for one in decided if one.source == HERE]
+    there = len(decided) - len(here)
+    by = [f"{len(here)} decided by this study"] if here else []
+    by += [f"{there} by the reference run that comes with the project ({found.reference})"] if there else []
+    says = f"Does the paper hold? Of its {len(found.verdicts)} claims {text.listing(parts)}: {text.listing(by)}."
+    differ = [one.row.id for one in found.verdicts if one.differs]
+    if differ:
+        says += f" The reference run judges {text.listing(differ)} otherwise."
+    main = next((one for one in decided if one.row.id == MAIN), None)
+    if main is not None:
+        measured = "; ".join(f"{name}, {span}" for name, span in main.corners[:3])
+        says += f" {main.row.claim} ({MAIN}) {main.verdict} ({main.source})."
+        says += f" Times as fast: {measured}." if measured else ""
+    return says
+
+
+def on_disturbance(study: Study) -> str:
+    """Says how disturbed the run was, as far as the records know."""
+    timed = study.timed
+    old = int((timed["schema"] == OLD_SCHEMA).sum())
+    if old == len(timed):
+        return "How disturbed the run was is unknown: its records are older than that field, and leave out the beginning of each clip."
+    rest = timed[timed["schema"] != OLD_SCHEMA]
+    doubtful = rest[rest["disturbed"] != ""]
+    of = f"{text.count(len(rest))} timed contestants"
+    if doubtful.empty:
+        return f"The machine was quiet: none of {of} waited for a processor or slowed down."
+    example = doubtful.iloc[0]
+    share = len(doubtful) / len(rest)
+    return (
+        f"The machine was {'often ' if share > 0.1 else ''}disturbed: {len(doubtful)} of {of} are doubtful and have a question mark, for example "
+        f"{example['title']} on {example['scene']} ({example['disturbed']})."
+    )
+
+
+@dataclass(frozen=True)
+class Sentence:
+    """One line of the top: its subject, the sentence, and the id of the part with the details."""
+
+    subject: str
+    says: str
+    place: str
+
+
+def sentences(study: Study, found: Sequence[Situation], errors: Sequence[time_error.Shown], known: Paper) -> list[Sentence]:
+    """Returns the five lines of the top; four in a study of other questions than pairs of two bodies."""
+    pairs = [one for one in found if one.asks == advice.PAIRS]
+    others: dict[str, Situation] = {one.asks: one for one in found if one.asks != advice.PAIRS}  # the one with the most frames a keyframe
+    said = []
+    if pairs:
+        ends = [pairs[-1], pairs[0]] if len(pairs) > 1 else pairs
+        said.append(Sentence("What to take", " ".join(advice.sentence(one) for one in ends), "glance"))
+    named = [others[asks] for asks in dict.fromkeys([advice.SELF, "rays", *others]) if asks in others][:2]
+    words = [advice.sentence(one) for one in named]
+    absent = [name for asks, name in ((advice.SELF, "pairs within a body"), ("rays", "rays")) if asks not in others]
+    words += [f"{text.listing(absent).capitalize()} were not asked for in this study."] if absent else []
+    said.append(Sentence("Other questions", " ".join(words), "glance"))
+    exactness = errors[0].sentences[0] if errors else "No contestant of this study answers wrongly, so it does not say what exactness costs."
+    said.append(Sentence("Time against error", exactness, "errors" if errors else "limits"))
+    said.append(Sentence("The paper", on_the_paper(known), "claims"))
+    said.append(Sentence("This run", on_disturbance(study), "limits"))
+    return said
+
+
+# ---- The chart
+
+TICKS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
+
+
+@dataclass
+class Bar:
+    """One line of the chart: the advice at one level of knowledge; places are percentages of the axis."""
+
+    known: str
+    best: Advice
+    low: float
+    at: float
+    high: float
+
+
+@dataclass
+class Chart:
+    """The advice by situation, on one logarithmic axis of speeds over the best refit."""
+
+    groups: list[tuple[Situation, list[Bar]]]
+    ticks: list[tuple[float, str]]
+
+
+def chart(found: Sequence[Situation]) -> Chart:
+    """Lays out the chart; advice that more knowledge does not change has no line of its own."""
+    kept: list[tuple[Situation, list[tuple[str, Advice]]]] = []
+    for one in found:
+        lines: list[tuple[str, Advice]] = []
+        for known, best in one.advice:
+            if best is not None and (not lines or best.id != lines[-1][1].id):
+                lines.append((known, best))
+        if lines:
+            kept.append((one, lines))
+    every = [value for _, lines in kept for _, best in lines for value in (best.low, best.high, best.speed) if value > 0] + [1.0]
+    low, high = math.log(min(min(every), 0.7) / 1.1), math.log(max(max(every), 1.5) * 1.1)
+
+    def place(value: float) -> float:
+        return round(100 * (math.log(value) - low) / (high - low), 2) if value > 0 else 0.0
+
+    groups = [(one, [Bar(known, best, place(best.low), place(best.speed), place(best.high)) for known, best in lines]) for one, lines in kept]
+    ticks = [(place(tick), f"{tick:g}") for tick in TICKS if low <= math.log(tick) <= high]
+    return Chart(groups, ticks)
+
+
+# ---- Scene by scene
+
+@dataclass
+class Fastest:
+    """The fastest contestant of a cell among those that need to know no more."""
+
+    title: str
+    contestant: str
+    ms: str
+    ratio: str
+    sure: bool  #: the interval, or range, excludes 1
+
+
+@dataclass
+class Line:
+    """One cell of the table of scenes."""
+
+    scene: str
+    asks: str
+    primitives: str
+    l: str
+    group: str  #: of the study
+    by_knowledge: list[Optional[Fastest]]  #: in the order of FORESIGHT; None where less knowledge does as well
+
+
+def lines(study: Study, every: Sequence[Cell]) -> list[Line]:
+    """Returns a line for each cell, in the order of the tables: what is the fastest in it, by what is known, in ms and over the best refit."""
+    order = {rows["group"].iloc[0]: place for place, rows in enumerate(study.groups())}
+    total = dict(zip(map(int, study.runs["run"]), study.runs["total_motion"]))
+    titles = dict(zip(study.runs["id"], study.runs["title"]))
+    allowed = {known: advice.allowed(study, known) for known in advice.FORESIGHT}
+    found = []
+    for cell in sorted(every, key=lambda cell: order[cell.row["group"]]):
+        by_knowledge: list[Optional[Fastest]] = []
+        last = None
+        for known in advice.FORESIGHT:
+            id = cell.best(allowed[known])
+            if id is None or id == last:
+                by_knowledge.append(None)
+                continue
+            last = id
+            run = cell.runs[id]
+            ratio = ratios.ratio(study, run, cell.refit, "with_motion") if run != cell.refit else None
+            told = "the best refit" if ratio is None else text.factor(ratio.middle) + ("?" if ratio.disturbed else "")
+            if ratio is not None and ratio.low < ratio.high:
+                ends = f"{text.factor(ratio.low)}–{text.factor(ratio.high)}"
+                told += f" ({ends})" if ratio.is_interval else f" [{ends}]"
+            by_knowledge.append(
+                Fastest(titles[id], cell.contestants[id], text.milliseconds(total[run]), told, ratio is not None and ratio.low > 1)
+            )
+        row = cell.row
+        scalar = "" if row["scalar"] == "float" else f", {row['scalar']}"
+        found.append(
+            Line(
+                str(row["scene"]) + scalar, "" if cell.asks == advice.PAIRS else cell.asks, text.size(row["primitives"]), f"{row['l']:g}",
+                str(row["group"]), by_knowledge,
+            )  # fmt: skip
+        )
+    return found

@@ -1,0 +1,1 @@
+"""The paper's claims held against results: points, verdicts, sentences, small pictures."""

@@ -1,0 +1,1 @@
+"""The explorer of results: its data (Python), and its page (src, built by `build`)."""

@@ -1,0 +1,1 @@
+"""From data to axes: colours, canvases and every figure."""

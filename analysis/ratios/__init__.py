@@ -1,0 +1,1 @@
+"""What times are compared with, and what follows: ratios, profiles, limits, ageing, choices, robustness."""

@@ -1,0 +1,1 @@
+"""The report, and the tables of pages and of the console."""

@@ -1,0 +1,1 @@
+"""What a folder of results holds: read, checked, and told as numbers a person reads."""
