@@ -19,7 +19,7 @@ class Positions {
     const py::ssize_t size = type.itemsize();
     if (array.ndim() != 2 || array.shape(1) != 3 || !array.dtype().equal(type) ||
         array.strides(0) % size != 0 || array.strides(1) % size != 0)
-      throw std::invalid_argument(what + " is an array of " + std::string(py::str(type)) +
+      throw std::invalid_argument(what + " is an array of " + std::string(py::str(py::handle(type))) +
                                   " of the shape (n, 3)");
     view_ = {array.data(), std::size_t(array.shape(0)), array.strides(0) / size, array.strides(1) / size};
   }
