@@ -1,6 +1,6 @@
-// Boxes that are linear in time: computed at the ends of each segment in which all flight plans are known to
+// Boxes that are linear in time: computed at both ends of each segment in which all flight plans are known to
 // be straight, and interpolated by the query at the nodes that it visits. Frames update nothing. Where
-// vertices move on curves, boxes are larger by as much as a curve may leave its chord. Prior art:
+// vertices move on curves, boxes grow by the most that a curve may leave its chord. Prior art:
 // core/adr/0010-prior-art-of-answering-intervals.md.
 
 #include "core/families/linear/linear_bounds.hpp"

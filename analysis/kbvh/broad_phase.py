@@ -57,7 +57,7 @@ class BroadPhase:
         moved: Optional[Union[Sequence[int], Array]] = None,
     ) -> None:
         """Takes other positions of the same mesh, or another motion from v to v1. With `moved`, only these rows of v are read,
-        and all others have to be what they were: the cost is in proportion to what moved."""
+        and all others have to be unchanged: the cost is in proportion to the elements that moved."""
         if moved is None:
             self._core.update(self._points(v), self._other(v1))
         elif v1 is None:

@@ -312,7 +312,7 @@ void BroadPhase<S>::take_leaf_pairs(CandidateKind kind, const ElementLeaves<S>& 
                                     std::size_t count, CandidateBuffer& out) {
   const auto pairs =
       element_pair_kernels<S>(kernels_).of[settings_.leaf_size <= 8 ? 0 : 1][std::size_t(kind)];
-  // Memory that is reserved and not written costs next to nothing; copies of long lists do.
+  // Memory that is reserved and not written costs next to nothing; copies of long lists are expensive.
   const std::size_t room_at_first =
       element_pairs_step +
       std::size_t(4) * (elements_->count(first_element(kind)) + elements_->count(second_element(kind)));

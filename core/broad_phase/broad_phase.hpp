@@ -63,12 +63,12 @@ class BroadPhase {
   void update(const MatrixView<S>& v);
   /// Takes another motion of the same mesh.
   void update(const MatrixView<S>& v0, const MatrixView<S>& v1);
-  /// Takes the positions of the vertices `moved` from the rows of V; all other rows must be what they were in
-  /// the last update, and are not read. Costs in proportion to what moved. Throws std::invalid_argument for
-  /// a vertex out of range, and std::logic_error after a swept update.
+  /// Takes the positions of the vertices `moved` from the rows of V; all other rows must be unchanged since
+  /// the last update, and are not read. Costs in proportion to the elements that moved. Throws
+  /// std::invalid_argument for a vertex out of range, and std::logic_error after a swept update.
   void update(const MatrixView<S>& v, std::span<const std::uint32_t> moved);
 
-  /// Makes the trees of earlier searches current now; the next search does it otherwise.
+  /// Makes the trees of earlier searches current now; otherwise the next search does this.
   void refresh();
 
   /// Finds candidates of one kind, into the caller's list, which is replaced. See `valid_for` for what stays.

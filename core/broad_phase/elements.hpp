@@ -26,7 +26,7 @@ concept StridedMatrix = requires(const Matrix& matrix) {
 };
 
 /// A read-only matrix in the caller's memory: entry (i, j) is data[i * row_step + j * column_step]. Nothing
-/// is copied; the memory has to live during the call that takes the view only. Matrices of Eigen convert.
+/// is copied; the memory has to live only during the call that takes the view. Matrices of Eigen convert.
 template <class T>
 struct MatrixView {
   const T* data = nullptr;

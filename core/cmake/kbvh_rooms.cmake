@@ -14,7 +14,7 @@ set(kbvh_kernel_flags_avx512 -mavx2 -mfma -mavx512f -mavx512vl -mavx512dq -mavx5
   -Wno-uninitialized)
 set(kbvh_kernel_sets portable)
 set(KBVH_KERNELS_HERE OFF CACHE STRING
-  "Beside the portable kernels compile only the widest that this processor runs, and those for SSE (ON) or not (WIDEST); OFF: all")
+  "Compile, in addition to the portable kernels, only the widest that this processor runs, and those for SSE (ON) or not (WIDEST); OFF: all")
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   list(APPEND kbvh_kernel_sets sse avx2 avx512)
   if(KBVH_KERNELS_HERE)

@@ -1,4 +1,4 @@
-// What kbvh::broad_phase takes, over other ways to the same pairs, all in one run and by turns: swept
+// The time of kbvh::broad_phase relative to other ways to the same pairs, in one run and by turns: swept
 // vertex-face and edge-edge candidates between two frames from scratch and with a known tree, iterates within
 // a bound, and updates of few vertices. Prints medians of processor time in ms, and ratios.
 //   kbvh_broad_phase_bench [FRAMES] [REPETITIONS]

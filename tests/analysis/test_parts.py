@@ -1,4 +1,4 @@
-"""tests/parts.py sees cases, shards and frames that no registered test plays: held against a program that lists cases."""
+"""tests/parts.py sees cases, shards and frames that no registered test plays: run on a program that lists cases."""
 
 import subprocess
 import sys

@@ -113,8 +113,8 @@ TEST(Table, TheBestRefitHasTheShortestClip) {
   EXPECT_EQ(best_refit(records), &records[0]) << "2 + 6.5 is longer than 8, by less than its positions";
 }
 
-// The program, the analysis and the explorer choose the same denominator from the same file: the two others
-// are held to it by tests/analysis/test_ratios.py and test_explore.py.
+// The program, the analysis and the explorer choose the same denominator from the same file: for the other
+// two, tests/analysis/test_ratios.py and test_explore.py check this.
 TEST(Table, TheBestRefitIsThatOfTheAnalysis) {
   const std::filesystem::path folder = std::filesystem::path(KBVH_PLANS) / "../../tests/support/results";
   std::map<std::string, std::vector<json>> tables;

@@ -7,7 +7,7 @@
 #include "core/motion/curved_piece.hpp"
 
 // Curves by rational arithmetic, from the definition in core/motion/curved_piece.hpp and nothing else of the
-// library: what roots, order and signs are held against.
+// library: the reference for roots, order and signs.
 
 namespace kbvh::test {
 

@@ -133,7 +133,7 @@ TYPED_TEST(BroadPhases, DistancesAreExact) {
 TYPED_TEST(BroadPhases, DistancesAtTheRadius) {
   using S = TypeParam;
   const S height = S(5), below = std::nextafter(height, S(0));
-  // A face in the plane z = 0, a vertex above its inside, an edge beside it at the distance 5 = |(3, 4)|.
+  // A face in the plane z = 0, a vertex above its inside, an edge next to it at the distance 5 = |(3, 4)|.
   Mesh<S> mesh;
   mesh.v0 = {-9, -9, 0, 9, -9, 0, 0, 9, 0, 0, 0, height, 3, 13, -1, -3, 13, -1, 0, 12, 4};
   mesh.faces = {0, 1, 2};

@@ -127,7 +127,7 @@ Rational moved(const Rational& s, double t0, double t1) {
   return Rational(t0) + s * (Rational(t1) - Rational(t0));
 }
 
-/// Holds every root of a pair against rational arithmetic; returns their number.
+/// Compares every root of a pair with rational arithmetic; returns their number.
 template <class S>
 int check_roots(const Pair<S>& pair, CurveStats& stats) {
   const SegmentRoots found = segment_roots(pair.a, pair.b, &stats), back = segment_roots(pair.b, pair.a);
@@ -352,7 +352,7 @@ TEST(CurveRoots, SignsAtAndAfterRootsAreExactInDouble) {
   check_signs<double>(6);
 }
 
-// What acts on all vertices alike leaves no trace in any certificate: the difference is a line, to the last
+// An effect on all vertices alike leaves no trace in any certificate: the difference is a line, to the last
 // bit.
 TEST(CurveRoots, PureGravityCancels) {
   Random random(7);
