@@ -364,7 +364,7 @@ class Auto final : public Strategy<S>,
     const double most =
         join_trial * frame * std::max(1.0, seen_.frames_per_segment) / costs::Work::join_box_test;
     if (runners_[active_].work->searches_within(std::uint64_t(std::min(most, 1e15)) + 1)) return;
-    join_.given_up(seen_);
+    join_.given_up(join_trial, seen_);
     --runners_[active_].frames;
     active_ = 0;
     ++runners_[active_].frames;

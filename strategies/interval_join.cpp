@@ -15,8 +15,8 @@
 // Boxes linear in time exceed those of a refit by a few roundings of their coordinates. Where gaps and
 // triangles are no larger than these roundings, the join lists far more pairs than a refit finds: nearly all
 // pairs where two sheets of unit size lie 0.1 apart at 1e6 in float, whose numbers are 0.06 apart there.
-// `auto` gives up such a join. The same holds for scenes about as small as the smallest normal number (1e-38 in
-// float), by which all margins are larger.
+// `auto` gives up such a join. The same holds for scenes about as small as the smallest normal number (1e-38
+// in float), by which all margins are larger.
 
 #include <algorithm>
 #include <limits>
@@ -247,8 +247,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S>,
   bool searches_within(std::uint64_t most) override {
     for (std::size_t i = 0; !joined_ && i < now_.joins.size(); ++i) {
       IntervalJoin<S>& one = now_.joins[i];
-      one.start(bounds_.segment(), this->scene_, bodies_of_join(bounds_.segment(), i),
-                IntervalJoin<S>::leaf_pairs_at_once);
+      one.start(bounds_.segment(), this->scene_, bodies_of_join(bounds_.segment(), i), leaf_pairs_in_part);
       const bool whole = one.step(most);
       this->count_.add(Counter::box_tests, one.tests());
       if (!whole) return false;
@@ -297,6 +296,8 @@ class IntervalJoinStrategy final : public CountedStrategy<S>,
 
   /// With more pairs of bodies than this, they are joined together: a separate join takes some kilobytes.
   static constexpr std::size_t most_joins = 16;
+  /// A join that is made in parts may stop after so many pairs of leaves.
+  static constexpr std::size_t leaf_pairs_in_part = 128;
 
   /// Keeps the pairs that intersect at the frame.
   void confirm_all(PairBuffer& pairs) {
@@ -409,7 +410,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S>,
   }
   /// Brings the work on joins and answers ahead to a share of the whole; a share of 1 or more completes it.
   void join_ahead(const LinearSegment<S>& segment, double share) {
-    constexpr std::size_t leaf_pairs = 128, tests_at_once = 4096, answers_at_once = 256;
+    constexpr std::size_t tests_at_once = 4096, answers_at_once = 256;
     const double wanted = share >= 1 ? std::numeric_limits<double>::infinity() : share * all_work();
     while (ahead_.done < wanted && (ahead_.stage == Stage::joins || ahead_.stage == Stage::answers)) {
       if (ahead_.join == next_.joins.size()) {
@@ -421,7 +422,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S>,
       IntervalJoin<S>& join = next_.joins[i];
       if (ahead_.stage == Stage::joins) {
         ahead_.joins_begun = true;
-        if (!ahead_.begun) join.start(segment, this->scene_, bodies_of_join(segment, i), leaf_pairs);
+        if (!ahead_.begun) join.start(segment, this->scene_, bodies_of_join(segment, i), leaf_pairs_in_part);
         const std::uint64_t before = ahead_.begun ? join.tests() : 0;
         ahead_.begun = !join.step(tests_at_once);
         ahead_.done += double(join.tests() - before);

@@ -53,13 +53,13 @@ class ObservedJoin {
     late_ = frame - frame_ > patience_ * std::max(1.0, refit_cost(seen) / join_cost(seen));
     outdated_ = outdated_ || late_;
   }
-  /// Registers that a join was given up before it was complete, because it took as many times the work of
-  /// refits of the same frames as a trial may.
-  void given_up(Observed& seen) {
+  /// Registers that a join was given up before it was whole, after so many times the work of a refit in the
+  /// frames of the segment.
+  void given_up(double times, Observed& seen) {
     double& factor = seen.near ? seen.join_factor : seen.apart_factor;
     factor = 1;
     const double predicted = join_cost(seen);
-    factor = std::max(most, predicted > 0 ? dearer * refit_cost(seen) / predicted : most);
+    factor = std::max(most, predicted > 0 ? times * refit_cost(seen) / predicted : most);
     kept_ = std::sqrt(kept_);
     known_ = known_ || seen.near;
     outdated_ = late_ = false;
