@@ -119,9 +119,8 @@ TEST_P(Configurations, AllConform) {
                                                                          ", width " + std::to_string(width) +
                                                                          ", leaf " + std::to_string(leaf));
   };
-  for (const std::string scene_name :
-       {"sheets", "integer_ties", "plan_changes", "geometry_changes", "self_rolled_cloth",
-        "self_plan_changes", "curved_ties"}) {
+  for (const std::string scene_name : {"sheets", "integer_ties", "plan_changes", "geometry_changes",
+                                       "self_rolled_cloth", "self_plan_changes", "curved_ties"}) {
     // Scripts and curves make every frame expensive: fewer frames and leaf sizes.
     const bool scripted = scene_name != "sheets" && scene_name != "integer_ties";
     const std::uint32_t l = scripted ? 2 : 7;

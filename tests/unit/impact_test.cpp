@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "core/motion/algebraic_time.hpp"
 #include "core/geometry/triangle_triangle.hpp"
+#include "core/motion/algebraic_time.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
 namespace kbvh::test::impact_test {
