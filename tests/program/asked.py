@@ -54,7 +54,7 @@ ASKED: dict[str, dict[str, Any]] = {
 COVERED = {"--continuous", "--changes", "--rays", "--kernels", "--self", "--order", "--seed", "--strategies", "--param", "--builder",
            "--width", "--leaf-size", "--l", "--scalar", "--repetitions", "--interval-width", "--seconds", "--frames-limit", "--oracle-every"}  # fmt: skip
 OTHERS = {"--help", "--scene", "--body", "--clip", "--name", "--triangles", "--obstacle", "--keyframes", "--script", "--out", "--plan",
-          "--study", "--print-plan", "--list-jobs", "--prepare", "--job"}  # fmt: skip
+          "--study", "--print-plan", "--names", "--list-jobs", "--prepare", "--job"}  # fmt: skip
 
 
 def require(holds: bool, what: str) -> None:
