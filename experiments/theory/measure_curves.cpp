@@ -4,6 +4,7 @@
 #include <iterator>
 #include <vector>
 
+#include "core/contract/registry.hpp"
 #include "core/families/events/algebraic_clock.hpp"
 #include "core/families/events/any_queue.hpp"
 #include "core/families/events/event_log.hpp"

@@ -279,10 +279,10 @@ void check_adversarial(int count, std::uint64_t seed) {
 }
 
 TEST(CurveRoots, EqualRationalArithmeticOnAdversarialPairsOfFloats) {
-  check_adversarial<float>(600, 3);
+  check_adversarial<float>(700, 3);
 }
 TEST(CurveRoots, EqualRationalArithmeticOnAdversarialPairsOfDoubles) {
-  check_adversarial<double>(600, 4);
+  check_adversarial<double>(400, 4);
 }
 
 template <class S>
