@@ -134,7 +134,7 @@ int run_study(const StudyOptions& options) {
         (outcome.skipped == 1 ? " was in " : " were in ") +
         (std::filesystem::path(options.out) / (options.job.empty() ? "results.jsonl" : "jobs")).string() +
         " already");
-  if (outcome.timed > 0)
+  if (outcome.tables > 1 && outcome.timed > 0)  // a single table says it itself
     say(outcome.disturbed == 0
             ? "the machine was quiet: none of " + counted(outcome.timed, "timed configuration") +
                   " was disturbed"

@@ -385,6 +385,7 @@ class Runner {
       ++outcome_.timed;
       if (!disturbed(record).empty()) ++outcome_.disturbed;
     }
+    ++outcome_.tables;
     print(results_table(records, shown_) + "\n");
     if (!failed.empty()) throw io::InputError(failed);
   }

@@ -12,6 +12,7 @@ namespace kbvh::experiments {
 struct StudyOutcome {
   std::size_t measured = 0;    ///< configurations
   std::size_t skipped = 0;     ///< already in the results
+  std::size_t tables = 0;      ///< printed
   std::size_t timed = 0;       ///< configurations with times, now or before
   std::size_t disturbed = 0;   ///< of these
   std::size_t refused = 0;     ///< without a time, because a guarantee was broken (also in earlier runs)
