@@ -60,7 +60,7 @@ class ObservedJoin {
     factor = 1;
     const double predicted = join_cost(seen);
     factor = std::max(most, predicted > 0 ? times * refit_cost(seen) / predicted : most);
-    kept_ = std::sqrt(kept_);
+    kept_ = std::pow(kept_, 0.25);  // it costs more than a whole segment that lost
     known_ = known_ || seen.near;
     outdated_ = late_ = false;
     compared_ = 0;
