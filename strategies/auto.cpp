@@ -18,6 +18,7 @@
 #include "core/families/choice/observed_join.hpp"
 #include "core/families/choice/observed_motion.hpp"
 #include "core/families/choice/observed_slabs.hpp"
+#include "core/families/choice/observed_work.hpp"
 #include "core/families/choice/predicted_costs.hpp"
 
 namespace kbvh {
@@ -94,7 +95,7 @@ class Auto final : public Strategy<S>,
     joined_candidates_ = 0;
     changes_of_many_.start_over();
     pairs_asked_ = pairs_in_frame_ = rays_asked_ = false;
-    window_ = {};
+    window_.close();
     body_changed_.assign(this->scene_.body_count(), 0);
     seen_ = {};
     seen_.reads = steps_.reads();
@@ -102,7 +103,7 @@ class Auto final : public Strategy<S>,
     seen_.bodies = steps_.moving_bodies();
     ageing_.start_over(runners_[0].work != nullptr ? runners_[0].work->surface() : 0);
     chosen_tests_ = 0;
-    searched_ = {};
+    searches_.start_over();
     saved_ = 0;
     savings_counted_until_ = 0;
     tried_ = waits_ = refits_first_ = joins_first_ = false;
@@ -136,7 +137,7 @@ class Auto final : public Strategy<S>,
     joins_first_ = active_ != last && is_active(&join_cost);
     Runner& runner = runners_[active_];
     if (active_ != last) start(runner, t);
-    if (window_.begins) begin_window();
+    window_.advance(frame_, runner.work, this->sampled_.fetched());
     if (active_ == last) {
       if (runner.all_positions) fetch_all();
       runner.strategy->advance(t);
@@ -296,7 +297,7 @@ class Auto final : public Strategy<S>,
   bool overworked() const {
     if (is_active(&join_cost)) return !seen_.near && searched() > gain_ * refit_cost(seen_);
     return is_active(&drift_cost) && frame_ - chosen_at_ >= shortest_stay &&
-           searched() > gain_ * refit_cost(seen_as_searched());
+           searched() > gain_ * refit_cost(searches_.as_seen(seen_, frame_ - chosen_at_));
   }
   /// Returns the mean cost of box tests and candidates of the active strategy since it was last chosen; for a
   /// join, the cost of the box tests of its segment.
@@ -307,17 +308,7 @@ class Auto final : public Strategy<S>,
       return work == nullptr
                  ? 0
                  : Work::join_box_test * double(work->last_box_tests()) / seen_.frames_per_segment;
-    return Work::plain.of(0, searched_.tests, searched_.candidates) / std::max(1, frame_ - chosen_at_);
-  }
-  /// Returns the observations, with the number of candidates that drift_boxes has had since; with more
-  /// candidates a refit makes more box tests.
-  Observed seen_as_searched() const {
-    Observed now = seen_;
-    now.candidates = searched_.candidates / std::max(1, frame_ - chosen_at_) / seen_.boxed;
-    const double more = std::max(1.0, now.candidates / std::max(1.0, seen_.candidates));
-    now.slab_tests *= more;
-    now.plain_tests *= more;
-    return now;
+    return searches_.cost(frame_ - chosen_at_);
   }
   /// Returns the strategy of least predicted cost among those that are `allowed`, or the active one if none
   /// is cheaper by `gain`.
@@ -370,7 +361,7 @@ class Auto final : public Strategy<S>,
     ++runners_[active_].frames;
     start(runners_[active_], t);
     changes_of_many_.switched();
-    window_ = {};
+    window_.close();
     stay_ = shortest_stay;
   }
   /// Strategies differ in the pairs that they leave out early. Only drift_boxes reports all pairs of boxes,
@@ -378,8 +369,7 @@ class Auto final : public Strategy<S>,
   void see_candidates(std::size_t count, bool all) {
     pairs_asked_ = pairs_in_frame_ = true;
     const ReportsWork* work = runners_[active_].work;
-    searched_.tests += work != nullptr ? double(work->last_box_tests()) : 0;
-    searched_.candidates += double(count);
+    searches_.add(work, double(count));
     if (count != 0 || is_active(&drift_cost)) seen_.near = count != 0;
     if (!seen_.near) seen_.candidates = double(count);
     if (is_active(&join_cost)) joined_candidates_ = double(count);
@@ -412,30 +402,11 @@ class Auto final : public Strategy<S>,
     if (frames >= longest_stay && seen_.candidates == 0) seen_.near = false;
     if (!is_active(&join_cost)) {
       if (frames >= shortest_stay) join_.forget(seen_);
-    } else if (whole && window_.frame != none && frame_ > window_.frame) {
-      join_.joined(seen_.near ? joined_work() : searched(), joined_candidates_, frame_, seen_);
+    } else if (whole && window_.has_frames(frame_)) {
+      const double work =
+          seen_.near ? window_.work(frame_, runner.work, this->sampled_.fetched(), seen_) : searched();
+      join_.joined(work, joined_candidates_, frame_, seen_);
     }
-  }
-  /// Returns the work of the join per frame of its window, which consists of whole segments.
-  double joined_work() const {
-    using Work = costs::Work;
-    const double frames = frame_ - window_.frame;
-    const ReportsWork* work = runners_[active_].work;
-    const double boxes = work != nullptr ? double(work->last_box_tests()) : 0;
-    const double in_frames = Work::span_test * double(span_tests() - window_.span_tests) +
-                             Work::join_triangle_test * double(frame_tests() - window_.frame_tests) +
-                             Work::join_fetch * double(this->sampled_.fetched() - window_.fetched);
-    return (Work::join_read * seen_.reads + Work::join_box_test * boxes) / seen_.frames_per_segment +
-           in_frames / frames;
-  }
-  void begin_window() { window_ = {false, frame_, span_tests(), frame_tests(), this->sampled_.fetched()}; }
-  std::uint64_t span_tests() const {
-    const ReportsWork* work = runners_[active_].work;
-    return work != nullptr ? work->span_tests() : 0;
-  }
-  std::uint64_t frame_tests() const {
-    const ReportsWork* work = runners_[active_].work;
-    return work != nullptr ? work->frame_tests() : 0;
   }
 
   void fetch_all() {
@@ -461,10 +432,11 @@ class Auto final : public Strategy<S>,
     see_work(whole);
     if (is_active(&drift_cost))
       runners_[active_].factor =
-          overworked() ? std::max(1.0, searched() / drift_cost(seen_as_searched())) : 1;
+          overworked() ? std::max(1.0, searched() / drift_cost(searches_.as_seen(seen_, frame_ - chosen_at_)))
+                       : 1;
     for (std::size_t i = 0; i < runners_.size(); ++i)
       if (i != active_) runners_[i].factor = std::pow(runners_[i].factor, forgets);
-    searched_ = {};
+    searches_.start_over();
     chosen_at_ = frame_;
     chosen_candidates_ = seen_.candidates;
     chosen_near_ = seen_.near;
@@ -499,19 +471,11 @@ class Auto final : public Strategy<S>,
     stay_ = best == active_ ? std::min(2 * stay_, longest_stay) : shortest_stay;
     active_ = best;
     if (!is_active(&join_cost))
-      window_ = {};
+      window_.close();
     else if (whole)
-      window_.begins = true;
+      window_.open_next();
   }
 
-  static constexpr int none = -1;
-  /// The frames over which the work of the join is measured: from the start of one segment to the start of
-  /// another.
-  struct Window {
-    bool begins = false;  ///< before the strategy advances
-    int frame = none;
-    std::uint64_t span_tests = 0, frame_tests = 0, fetched = 0;  ///< until then
-  };
   SegmentMotion<S> motion_;
   ObservedMotion<S> steps_;
   double gain_;
@@ -524,19 +488,17 @@ class Auto final : public Strategy<S>,
   double chosen_candidates_ = 0;       ///< number of candidates at the time of the choice
   bool chosen_near_ = false;           ///< whether bodies met at that time
   double chosen_tests_ = 0;            ///< box tests of the refitted trees in the last frame
-  struct Searched {
-    double tests = 0, candidates = 0;
-  } searched_;                     ///< since the last choice
-  double saved_ = 0;               ///< nanoseconds, see worth_a_start
-  int savings_counted_until_ = 0;  ///< frame up to which savings are in `saved_`
-  bool tried_ = false;             ///< on trial: its work decides whether the active strategy stays
+  ObservedSearches searches_;          ///< since the last choice
+  double saved_ = 0;                   ///< nanoseconds, see worth_a_start
+  int savings_counted_until_ = 0;      ///< frame up to which savings are in `saved_`
+  bool tried_ = false;                 ///< on trial: its work decides whether the active strategy stays
   ObservedAgeing ageing_;
   bool joins_first_ = false;   ///< the join answers for the first time since another strategy
   bool waits_ = false;         ///< for the next segment, before a join is chosen
   bool refits_first_ = false;  ///< a refit answers before new trees are tried
   ObservedJoin join_;
   double joined_candidates_ = 0;  ///< of the join's last frame
-  Window window_;
+  JoinWindow window_;
   ObservedSlabs slabs_;
   bool pairs_asked_ = false, rays_asked_ = false;  ///< since the last choice
   bool pairs_in_frame_ = false;
