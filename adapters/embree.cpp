@@ -61,7 +61,7 @@
 #include "core/families/wide/near_bodies.hpp"
 #include "core/parallel/library_threads.hpp"
 #include "core/scene/pairs_by_thread.hpp"
-#include "core/topology/ray_traversal.hpp"
+#include "core/topology/probe_traversal.hpp"
 #include "embree.hpp"
 
 namespace kbvh {
@@ -110,9 +110,8 @@ class EmbreeRefit final : public CountedStrategy<S>, public AnswersRays<S>, publ
     shared_confirmation_.confirm(this->scene_, this->sampled_, pairs, this->triangle_stats_);
   }
 
-  void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
-                 std::span<RayHit> hits) override {
-    threads_.call([&] { trace(query, rays, hits); });
+  void find_hits(double /*t*/, const RayProbes<S>& rays) override {
+    threads_.call([&] { trace(rays.query, rays.rays, rays.hits); });
   }
 
   void follow_plans(double /*t*/, std::span<const PlanChange<S>> changes) override {
@@ -207,33 +206,41 @@ class EmbreeRefit final : public CountedStrategy<S>, public AnswersRays<S>, publ
     return bounds_of_scene(state.cuts());
   }
 
+  /// A ray that Embree follows, as a search of bodies in front of what it has found.
+  struct ByEmbree {
+    RaySlabs boxes;
+    const RTCRayHit* found;
+    RaySlabs box_test() const { return boxes; }
+    double limit() const { return double(found->ray.tfar); }
+  };
   void trace(RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits) {
     const KeepFloatingPointState keep;
     std::uint64_t tests = 0;
-    ray_order_.start(this->scene_, [&](std::uint32_t body) { return box_for_rays(bodies_[body]); });
+    ray_order_.start(this->scene_, &RayProbes<S>::meets,
+                     [&](std::uint32_t body) { return box_for_rays(bodies_[body]); });
     for (std::size_t i = 0; i < rays.size(); ++i) {
       hits[i] = {};
       RTCRayHit found = ray_of(rays[i]);
-      const auto limit = [&] { return double(found.ray.tfar); };
-      tests += ray_order_.follow(RaySearch<S>(rays[i], query).line(), limit, [&](std::uint32_t body, bool) {
-        BodyState& state = bodies_[body];
-        bring_cuts_up_to_date(state);
-        RTCIntersectContext context;
-        rtcInitIntersectContext(&context);
-        if (query == RayQuery::any) {
-          rtcOccluded1(state.cuts().scene.get(), &context, &found.ray);
-          if (found.ray.tfar >= 0) return false;
-          hits[i] = {state.body, RayHit::none, std::numeric_limits<double>::quiet_NaN()};
-          return true;
-        }
-        found.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-        rtcIntersect1(state.cuts().scene.get(), &context, &found);
-        if (found.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
-        const std::uint32_t triangle = found.hit.primID;
-        hits[i] = {state.body, state.cut_primitives.empty() ? triangle : state.cut_primitives[triangle],
-                   double(found.ray.tfar)};
-        return false;
-      });
+      tests += ray_order_.follow(
+          ByEmbree{RaySearch<S>(rays[i], query).box_test(), &found}, [&](std::uint32_t body, bool) {
+            BodyState& state = bodies_[body];
+            bring_cuts_up_to_date(state);
+            RTCIntersectContext context;
+            rtcInitIntersectContext(&context);
+            if (query == RayQuery::any) {
+              rtcOccluded1(state.cuts().scene.get(), &context, &found.ray);
+              if (found.ray.tfar >= 0) return false;
+              hits[i] = {state.body, RayHit::none, std::numeric_limits<double>::quiet_NaN()};
+              return true;
+            }
+            found.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+            rtcIntersect1(state.cuts().scene.get(), &context, &found);
+            if (found.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
+            const std::uint32_t triangle = found.hit.primID;
+            hits[i] = {state.body, state.cut_primitives.empty() ? triangle : state.cut_primitives[triangle],
+                       double(found.ray.tfar)};
+            return false;
+          });
     }
     ray_order_.count(this->ray_bodies());
     this->count_.add(Counter::box_tests, tests);
@@ -459,7 +466,7 @@ class EmbreeRefit final : public CountedStrategy<S>, public AnswersRays<S>, publ
   DevicePointer device_;
   std::vector<BodyState> bodies_;
   NearBodies near_bodies_;
-  RayBodyOrder ray_order_;
+  BodyOrder ray_order_;
   Collected collected_;
   SharedConfirmation<S> shared_confirmation_;
 };

@@ -49,7 +49,7 @@ const std::vector<Candidate>& candidates() {
 template <class S>
 class Auto final : public Strategy<S>,
                    public AnswersChanges<S>,
-                   public AnswersRays<S>,
+                   public AnswersProbes<S>,
                    public TakesPlanChanges<S> {
  public:
   static constexpr Foresight foresight = Foresight::next_keyframe;
@@ -173,9 +173,9 @@ class Auto final : public Strategy<S>,
     touching_of_ = &pairs;
   }
 
-  void find_hits(double t, RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits) override {
+  void answer_probes(double t, const Probes<S>& probes) override {
     const Runner& runner = runners_[active_];
-    runner.strategy->hits_at(t, query, rays, hits);
+    runner.strategy->probe_at(t, probes);
     rays_asked_ = true;
     // If pairs are asked for as well, they show how trees age.
     if (pairs_in_frame_ || runner.work == nullptr) return;

@@ -7,7 +7,7 @@
 #include "core/base/heap_block.hpp"
 #include "core/contract/registry.hpp"
 #include "core/families/wide/near_bodies.hpp"
-#include "core/topology/ray_traversal.hpp"
+#include "core/topology/probe_traversal.hpp"
 
 namespace kbvh {
 namespace {
@@ -23,7 +23,7 @@ struct PeriodNode {
   bool is_leaf() const { return left == nullptr; }
 };
 
-/// The nodes as a tree for `follow_ray`.
+/// The nodes as a tree for `follow_probe`.
 template <class S>
 struct PeriodTree {
   using Node = const PeriodNode<S>*;
@@ -44,7 +44,7 @@ struct PeriodTree {
 };
 
 template <class S>
-class BottomUpPeriod final : public CountedStrategy<S>, public AnswersRays<S>, public TakesPlanChanges<S> {
+class BottomUpPeriod final : public CountedStrategy<S>, public AnswersProbes<S>, public TakesPlanChanges<S> {
   using Node = PeriodNode<S>;
 
  public:
@@ -84,16 +84,15 @@ class BottomUpPeriod final : public CountedStrategy<S>, public AnswersRays<S>, p
     return {};
   }
 
-  void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
-                 std::span<RayHit> hits) override {
+  void answer_probes(double /*t*/, const Probes<S>& probes) override {
     const auto box_of = [&](std::uint32_t body) {
       return roots_[body] == nullptr ? Box<S>{} : roots_[body]->box;
     };
-    const std::uint64_t all = find_hits_by_body(
-        this->scene_, this->sampled_, query, rays, hits, ray_order_, this->ray_bodies(), box_of,
-        [&](std::uint32_t body, RaySearch<S>& search, std::uint64_t& tests) {
-          return follow_ray(PeriodTree<S>{roots_[body]}, search, body, this->scene_.primitives(body),
-                            this->sampled_.positions(body), ray_stack_, tests, this->triangle_stats_);
+    const std::uint64_t all = answer_by_body(
+        this->scene_, this->sampled_, probes, probe_order_, this->ray_bodies(), box_of,
+        [&](std::uint32_t body, auto& search, std::uint64_t& tests) {
+          return follow_probe(PeriodTree<S>{roots_[body]}, search, body, this->scene_.primitives(body),
+                              this->sampled_.positions(body), probe_stack_, tests, this->triangle_stats_);
         });
     this->count_.add(Counter::box_tests, all);
   }
@@ -110,8 +109,8 @@ class BottomUpPeriod final : public CountedStrategy<S>, public AnswersRays<S>, p
 
   std::size_t bytes() const override {
     std::size_t total = near_bodies_.bytes() + nodes_.size() * heap_block_bytes(sizeof(Node)) +
-                        nodes_.capacity() * sizeof(nodes_[0]) + ray_order_.bytes() +
-                        ray_stack_.capacity() * sizeof(ray_stack_[0]);
+                        nodes_.capacity() * sizeof(nodes_[0]) + probe_order_.bytes() +
+                        probe_stack_.capacity() * sizeof(probe_stack_[0]);
     for (const Topology& topology : topologies_) total += topology.bytes();
     return total;
   }
@@ -185,8 +184,8 @@ class BottomUpPeriod final : public CountedStrategy<S>, public AnswersRays<S>, p
   Topologies topologies_;
   std::vector<std::unique_ptr<Node>> nodes_;
   std::vector<Node*> roots_;
-  std::vector<RayNode<const Node*>> ray_stack_;
-  RayBodyOrder ray_order_;
+  std::vector<ProbeNode<const Node*>> probe_stack_;
+  BodyOrder probe_order_;
   bool plans_changed_ = false;
 };
 

@@ -5,7 +5,7 @@
 
 #include "core/contract/registry.hpp"
 #include "core/families/wide/near_bodies.hpp"
-#include "core/topology/ray_traversal.hpp"
+#include "core/topology/probe_traversal.hpp"
 
 namespace kbvh {
 namespace {
@@ -26,7 +26,9 @@ struct RecursiveBody {
 
 /// Both recursions are as deep as the topologies: log2 n for the median.
 template <class S>
-class BottomUpRecursive final : public CountedStrategy<S>, public AnswersRays<S>, public TakesPlanChanges<S> {
+class BottomUpRecursive final : public CountedStrategy<S>,
+                                public AnswersProbes<S>,
+                                public TakesPlanChanges<S> {
   using Body = RecursiveBody<S>;
 
  public:
@@ -68,18 +70,17 @@ class BottomUpRecursive final : public CountedStrategy<S>, public AnswersRays<S>
     return {};
   }
 
-  void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
-                 std::span<RayHit> hits) override {
+  void answer_probes(double /*t*/, const Probes<S>& probes) override {
     const auto box_of = [&](std::uint32_t index) {
       return bodies_[index].topology.empty() ? Box<S>{} : bodies_[index].boxes[0];
     };
-    const std::uint64_t all = find_hits_by_body(
-        this->scene_, this->sampled_, query, rays, hits, ray_order_, this->ray_bodies(), box_of,
-        [&](std::uint32_t index, RaySearch<S>& search, std::uint64_t& tests) {
+    const std::uint64_t all = answer_by_body(
+        this->scene_, this->sampled_, probes, probe_order_, this->ray_bodies(), box_of,
+        [&](std::uint32_t index, auto& search, std::uint64_t& tests) {
           const Body& body = bodies_[index];
           const TopologyTree tree{body.topology, [&](std::uint32_t node) { return body.boxes[node]; }};
-          return follow_ray(tree, search, index, *body.primitives, body.positions, ray_stack_, tests,
-                            this->triangle_stats_);
+          return follow_probe(tree, search, index, *body.primitives, body.positions, probe_stack_, tests,
+                              this->triangle_stats_);
         });
     this->count_.add(Counter::box_tests, all);
   }
@@ -95,8 +96,8 @@ class BottomUpRecursive final : public CountedStrategy<S>, public AnswersRays<S>
   }
 
   std::size_t bytes() const override {
-    std::size_t total =
-        near_bodies_.bytes() + ray_order_.bytes() + ray_stack_.capacity() * sizeof(RayNode<std::uint32_t>);
+    std::size_t total = near_bodies_.bytes() + probe_order_.bytes() +
+                        probe_stack_.capacity() * sizeof(ProbeNode<std::uint32_t>);
     for (const Body& body : bodies_) total += body.topology.bytes() + body.boxes.size() * sizeof(Box<S>);
     return total;
   }
@@ -168,8 +169,8 @@ class BottomUpRecursive final : public CountedStrategy<S>, public AnswersRays<S>
 
   NearBodies near_bodies_;
   std::vector<Body> bodies_;
-  std::vector<RayNode<std::uint32_t>> ray_stack_;
-  RayBodyOrder ray_order_;
+  std::vector<ProbeNode<std::uint32_t>> probe_stack_;
+  BodyOrder probe_order_;
   bool plans_changed_ = false;
 };
 

@@ -3,8 +3,7 @@
 
 #include "core/contract/registry.hpp"
 #include "core/geometry/lane_box.hpp"
-#include "core/geometry/ray_box.hpp"
-#include "core/scene/rays.hpp"
+#include "core/scene/probes.hpp"
 #include "core/scene/self_pairs.hpp"
 
 namespace kbvh {
@@ -14,7 +13,7 @@ template <class S>
 class BruteForce final : public CountedStrategy<S>,
                          public AnswersSelfPairs,
                          public AnswersSweeps<S>,
-                         public AnswersRays<S>,
+                         public AnswersProbes<S>,
                          public TakesPlanChanges<S>,
                          public TakesGeometryChanges<S> {
  public:
@@ -74,14 +73,18 @@ class BruteForce final : public CountedStrategy<S>,
     this->count_.add(Counter::box_tests, tests);
   }
 
-  void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
-                 std::span<RayHit> hits) override {
-    for (std::size_t i = 0; i < rays.size(); ++i) {
-      RaySearch<S> search(rays[i], query);
-      bool over = false;
-      for (std::uint32_t body = 0; body < boxes_.size() && !over; ++body) over = follow(body, search);
-      hits[i] = search.hit();
-    }
+  void answer_probes(double /*t*/, const Probes<S>& probes) override {
+    std::visit(
+        [&](const auto& asked) {
+          for (std::size_t i = 0; i < asked.size(); ++i) {
+            auto search = asked.search(i);
+            bool over = false;
+            for (std::uint32_t body = 0; body < boxes_.size() && !over; ++body)
+              if (asked.meets(this->scene_.primitives(body).kind)) over = follow(body, search);
+            asked.take(i, search);
+          }
+        },
+        probes);
   }
 
   void follow_plans(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {}
@@ -95,14 +98,14 @@ class BruteForce final : public CountedStrategy<S>,
   }
 
  private:
-  bool follow(std::uint32_t body, RaySearch<S>& search) {
+  template <class Search>
+  bool follow(std::uint32_t body, Search& search) {
     const Primitives& primitives = this->scene_.primitives(body);
-    if (primitives.kind != PrimitiveKind::polygons) return false;
-    const RaySlabs slabs(search.line());
+    const auto boxes = search.box_test();
     this->count_.add(Counter::box_tests, boxes_[body].size());
     double near = 0;
     for (std::uint32_t p = 0; p < boxes_[body].size(); ++p)
-      if (primitives.alive(p) && slabs.meet(boxes_[body][p], search.limit(), near) &&
+      if (primitives.alive(p) && boxes.meet(boxes_[body][p], search.limit(), near) &&
           search.offer(body, p, primitives.triangles(p), this->sampled_.positions(body),
                        this->triangle_stats_))
         return true;

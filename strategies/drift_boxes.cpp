@@ -18,7 +18,7 @@
 #include "core/contract/reports_work.hpp"
 #include "core/families/drift/drift_body.hpp"
 #include "core/families/drift/drift_model.hpp"
-#include "core/families/drift/drift_rays.hpp"
+#include "core/families/drift/drift_probes.hpp"
 #include "core/families/drift/near_pairs.hpp"
 #include "core/families/wide/kernels/bounds.hpp"
 #include "core/families/wide/near_bodies.hpp"
@@ -29,7 +29,7 @@ namespace {
 
 template <class S, class Motion>
 class DriftStrategy : public CountedStrategy<S>,
-                      public AnswersRays<S>,
+                      public AnswersProbes<S>,
                       public TakesPlanChanges<S>,
                       public ReportsWork {
   using Body = DriftBody<S>;
@@ -83,7 +83,7 @@ class DriftStrategy : public CountedStrategy<S>,
     period_ = 0;
     plain_left_ = 1;
     search_due_ = plans_changed_ = false;
-    rays_.moved();
+    probes_.moved();
   }
 
   void advance_to(double t) override {
@@ -92,7 +92,7 @@ class DriftStrategy : public CountedStrategy<S>,
     for (std::uint32_t index = 0; index < bodies_.size(); ++index) observe(index, last, t);
     listed() ? advance_listed() : advance_plain();
     count_skipped();
-    rays_.moved();
+    probes_.moved();
   }
 
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& /*budget*/) override {
@@ -113,16 +113,14 @@ class DriftStrategy : public CountedStrategy<S>,
     return {};
   }
 
-  void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
-                 std::span<RayHit> hits) override {
+  void answer_probes(double /*t*/, const Probes<S>& probes) override {
     std::uint64_t tests = 0;
-    rays_.find(hierarchies_, bodies_, listed(), query, rays, hits, this->triangle_stats_, tests,
-               this->ray_bodies());
+    probes_.answer(hierarchies_, bodies_, listed(), probes, this->triangle_stats_, tests, this->ray_bodies());
     this->count_.add(Counter::box_tests, tests);
   }
 
   void follow_plans(double /*t*/, std::span<const PlanChange<S>> changes) override {
-    rays_.moved();
+    probes_.moved();
     for (const PlanChange<S>& change : changes) {
       Body& body = bodies_[change.body];
       body.changed = true;
@@ -160,7 +158,7 @@ class DriftStrategy : public CountedStrategy<S>,
     for (const auto& body : bodies_) total += body.before.capacity() * sizeof(S);
     for (const auto& lists : lists_of_) total += lists.bytes();
     for (const auto& rows : rows_) total += rows.bytes();
-    return total + work_.bytes() + rays_.bytes() + near_bodies_.bytes() + pair_is_near_.size() +
+    return total + work_.bytes() + probes_.bytes() + near_bodies_.bytes() + pair_is_near_.size() +
            near_pairs_.capacity() * sizeof(std::uint32_t);
   }
 
@@ -463,7 +461,7 @@ class DriftStrategy : public CountedStrategy<S>,
   std::vector<NearPairs<S>> lists_of_;  ///< [near pair]; never shrinks
   NearWork<S> work_;
   WideQuery<S> query_{this->scene_, this->sampled_};
-  DriftRays<S> rays_{this->scene_, this->sampled_};
+  DriftProbes<S> probes_{this->scene_, this->sampled_};
   DriftModel model_;
   int frames_ = 0;      ///< since positions were remembered
   int period_ = 0;      ///< frames that one search lasts; 0: refit and query at every frame

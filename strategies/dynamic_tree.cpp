@@ -8,7 +8,7 @@
 #include "core/families/build/built_each_frame.hpp"
 #include "core/geometry/lane_box.hpp"
 #include "core/scene/self_pairs.hpp"
-#include "core/topology/ray_traversal.hpp"
+#include "core/topology/probe_traversal.hpp"
 
 namespace kbvh {
 namespace {
@@ -22,9 +22,9 @@ struct DynamicBody {
   std::size_t bytes() const { return tree.bytes() + tight.capacity() * sizeof(Box<S>); }
 };
 
-/// A DynamicTree for `follow_ray`.
+/// A DynamicTree for `follow_probe`.
 template <class S>
-struct DynamicRays {
+struct DynamicProbes {
   using Node = std::uint32_t;
   const DynamicTree<S>& tree;
 
@@ -44,7 +44,7 @@ struct DynamicRays {
 };
 
 template <class S>
-class Dynamic final : public BuiltEachFrame<S, DynamicBody<S>>, public AnswersRays<S> {
+class Dynamic final : public BuiltEachFrame<S, DynamicBody<S>>, public AnswersProbes<S> {
   using Base = BuiltEachFrame<S, DynamicBody<S>>;
   using Base::bodies_;
   using Base::lists_;
@@ -81,23 +81,23 @@ class Dynamic final : public BuiltEachFrame<S, DynamicBody<S>>, public AnswersRa
     return view;
   }
   std::size_t bytes() const override {
-    return Base::bytes() + stack_.capacity() * sizeof(NodePair) + ray_order_.bytes() +
-           ray_stack_.capacity() * sizeof(RayNode<std::uint32_t>);
+    return Base::bytes() + stack_.capacity() * sizeof(NodePair) + probe_order_.bytes() +
+           probe_stack_.capacity() * sizeof(ProbeNode<std::uint32_t>);
   }
 
  protected:
-  void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
-                 std::span<RayHit> hits) override {
+  void answer_probes(double /*t*/, const Probes<S>& probes) override {
     const auto box_of = [&](std::uint32_t body) {
       const DynamicTree<S>& tree = bodies_[body].tree;
       return tree.empty() ? Box<S>{} : tree.node(tree.root()).box;
     };
-    const std::uint64_t all = find_hits_by_body(
-        this->scene_, this->sampled_, query, rays, hits, ray_order_, this->ray_bodies(), box_of,
-        [&](std::uint32_t body, RaySearch<S>& search, std::uint64_t& tests) {
-          return follow_ray(DynamicRays<S>{bodies_[body].tree}, search, body, this->scene_.primitives(body),
-                            this->sampled_.positions(body), ray_stack_, tests, this->triangle_stats_);
-        });
+    const std::uint64_t all =
+        answer_by_body(this->scene_, this->sampled_, probes, probe_order_, this->ray_bodies(), box_of,
+                       [&](std::uint32_t body, auto& search, std::uint64_t& tests) {
+                         return follow_probe(DynamicProbes<S>{bodies_[body].tree}, search, body,
+                                             this->scene_.primitives(body), this->sampled_.positions(body),
+                                             probe_stack_, tests, this->triangle_stats_);
+                       });
     this->count_.add(Counter::box_tests, all);
   }
 
@@ -164,8 +164,8 @@ class Dynamic final : public BuiltEachFrame<S, DynamicBody<S>>, public AnswersRa
 
   double margin_, ahead_;
   std::vector<NodePair> stack_;
-  std::vector<RayNode<std::uint32_t>> ray_stack_;
-  RayBodyOrder ray_order_;
+  std::vector<ProbeNode<std::uint32_t>> probe_stack_;
+  BodyOrder probe_order_;
   std::uint64_t reinserted_ = 0;
 };
 

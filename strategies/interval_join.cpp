@@ -28,7 +28,7 @@
 #include "core/families/linear/interval_join.hpp"
 #include "core/families/linear/join_changes.hpp"
 #include "core/families/linear/linear_bounds.hpp"
-#include "core/families/linear/linear_rays.hpp"
+#include "core/families/linear/linear_probes.hpp"
 #include "core/families/linear/triangle_span_filter.hpp"
 #include "core/families/wide/swept_hierarchies.hpp"
 
@@ -69,7 +69,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S>,
                                    public AnswersSelfPairs,
                                    public AnswersChanges<S>,
                                    public AnswersSweeps<S>,
-                                   public AnswersRays<S>,
+                                   public AnswersProbes<S>,
                                    public TakesPlanChanges<S>,
                                    public ReportsWork {
   static constexpr bool works_ahead = F == Foresight::whole_clip;
@@ -111,7 +111,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S>,
     for (Joins<S>* one : {&now_, &next_})
       for (auto& answers : one->answers) answers.start_over();
     bounds_.start();
-    ray_boxes_are_old_ = true;
+    probe_boxes_are_old_ = true;
     changes_.start_over();
     new_segment();
     before_ = t;
@@ -121,7 +121,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S>,
 
   void advance_to(double /*t*/) override {
     before_ = this->previous_time();
-    ray_boxes_are_old_ = true;
+    probe_boxes_are_old_ = true;
     if (bounds_.advance()) new_segment();
     if constexpr (works_ahead) make_bounds_ahead();
   }
@@ -185,19 +185,19 @@ class IntervalJoinStrategy final : public CountedStrategy<S>,
   }
 
   /// Follows rays through the boxes of the segment, interpolated at t where rays read them.
-  void find_hits(double t, RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits) override {
-    if (std::exchange(ray_boxes_are_old_, false)) {
-      ray_stale_.resize(bounds_.body_count());
+  void answer_probes(double t, const Probes<S>& probes) override {
+    if (std::exchange(probe_boxes_are_old_, false)) {
+      probe_stale_.resize(bounds_.body_count());
       for (std::uint32_t body = 0; body < bounds_.body_count(); ++body)
-        ray_stale_[body].assign(bounds_.hierarchy(body).node_count(), 1);
+        probe_stale_[body].assign(bounds_.hierarchy(body).node_count(), 1);
     }
     std::uint64_t tests = 0;
-    rays_.find(bounds_, t, ray_stale_, query, rays, hits, this->triangle_stats_, tests, this->ray_bodies());
+    probes_.answer(bounds_, t, probe_stale_, probes, this->triangle_stats_, tests, this->ray_bodies());
     this->count_.add(Counter::box_tests, tests);
   }
 
   void prepare_sweep(double /*t*/) override {
-    ray_boxes_are_old_ = true;
+    probe_boxes_are_old_ = true;
     if (plans_changed_) return;  // lines may have no end; the sweep's end is known only afterwards
     bounds_.enter();
     changes_.leave_segment(parts());
@@ -226,7 +226,7 @@ class IntervalJoinStrategy final : public CountedStrategy<S>,
 
   /// Keeps the segment if possible; the next read repairs its joins.
   void follow_plans(double /*t*/, std::span<const PlanChange<S>> changes) override {
-    plans_changed_ = ray_boxes_are_old_ = true;
+    plans_changed_ = probe_boxes_are_old_ = true;
     ahead_ = {};
     if (repairs_ && bounds_.repair(changes)) return;
     bounds_.plans_changed();
@@ -266,11 +266,12 @@ class IntervalJoinStrategy final : public CountedStrategy<S>,
 
   std::size_t bytes() const override {
     std::size_t total = bounds_.bytes() + now_.bytes() + next_.bytes() + query_.bytes() + changes_.bytes() +
-                        rays_.bytes() + shared_confirmation_.bytes() + parts_.capacity() * sizeof(parts_[0]) +
+                        probes_.bytes() + shared_confirmation_.bytes() +
+                        parts_.capacity() * sizeof(parts_[0]) +
                         (answered_.capacity() + to_test_.capacity()) * sizeof(PrimitivePair) +
                         blocks_.capacity() * sizeof(Block) + joined_bodies_.capacity() * sizeof(BodyPair);
     for (const auto& sweep : sweeps_) total += sweep.bytes();
-    for (const auto& marks : ray_stale_) total += marks.capacity();
+    for (const auto& marks : probe_stale_) total += marks.capacity();
     return total + (swept_ ? swept_->bytes() : 0);
   }
 
@@ -445,9 +446,9 @@ class IntervalJoinStrategy final : public CountedStrategy<S>,
   std::vector<IntervalJoin<S>> sweeps_;       ///< for contacts, after the first request
   std::optional<SweptHierarchies<S>> swept_;  ///< for contacts after changes of plans
   WideQuery<S> query_;
-  LinearRays<S> rays_{this->scene_, this->sampled_};
-  std::vector<std::vector<std::uint8_t>> ray_stale_;  ///< [body][wide node], from the first rays on
-  bool ray_boxes_are_old_ = true;
+  LinearProbes<S> probes_{this->scene_, this->sampled_};
+  std::vector<std::vector<std::uint8_t>> probe_stale_;  ///< [body][wide node], from the first rays on
+  bool probe_boxes_are_old_ = true;
   bool plans_changed_ = false, repairs_ = true;
   std::uint64_t pairs_removed_ = 0, pairs_added_ = 0;
   std::vector<bool> by_spans_;   ///< by join

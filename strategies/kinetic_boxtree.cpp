@@ -15,7 +15,7 @@
 #include "core/families/events/event_log.hpp"
 #include "core/families/wide/lazy_query.hpp"
 #include "core/families/wide/near_bodies.hpp"
-#include "core/families/wide/wide_rays.hpp"
+#include "core/families/wide/wide_probes.hpp"
 
 namespace kbvh {
 namespace {
@@ -31,7 +31,7 @@ BoxTreeConstruction construction(const Params& params, LeafBoxes leaf_boxes, std
 
 template <class S>
 class KineticBox final : public CountedStrategy<S>,
-                         public AnswersRays<S>,
+                         public AnswersProbes<S>,
                          public EventSource<S>,
                          public TakesPlanChanges<S>,
                          public TakesGeometryChanges<S> {
@@ -100,13 +100,12 @@ class KineticBox final : public CountedStrategy<S>,
     return status;
   }
 
-  void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
-                 std::span<RayHit> hits) override {
+  void answer_probes(double /*t*/, const Probes<S>& probes) override {
     std::uint64_t tests = 0;
     for (std::uint32_t body = 0; body < rows_.size(); ++body)
       this->count_.add(Counter::positions_fetched, rows_[body].make_visited(tree_of(body), motion_, body));
-    rays_.find(
-        query, rays, hits,
+    probes_.answer(
+        probes,
         [&](std::uint32_t body) -> WideSide<S> {
           return {.hierarchy = &rows_[body].hierarchy(), .body = body, .stale = rows_[body].stale()};
         },
@@ -169,7 +168,7 @@ class KineticBox final : public CountedStrategy<S>,
 
   std::size_t bytes() const override {
     std::size_t total = forest_.bytes();
-    total += near_bodies_.bytes() + query_.bytes() + rays_.bytes();
+    total += near_bodies_.bytes() + query_.bytes() + probes_.bytes();
     for (const auto& rows : rows_) total += rows.bytes();
     for (const auto& cache : caches_) total += cache.bytes();
     for (const auto& degradation : degradations_) total += degradation.bytes();
@@ -244,7 +243,7 @@ class KineticBox final : public CountedStrategy<S>,
   LeafBoxes leaf_boxes_;
   std::vector<BoxTreeRows<S>> rows_;  ///< [body]
   WideQuery<S> query_{this->scene_, this->sampled_};
-  WideRays<S> rays_{this->scene_, this->sampled_};
+  WideProbes<S> probes_{this->scene_, this->sampled_};
   std::uint64_t first_step_ = 0;
   std::vector<std::uint32_t> order_;
   bool rebuilds_;

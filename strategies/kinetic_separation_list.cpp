@@ -11,7 +11,7 @@
 #include "core/families/separation/kinetic_collision.hpp"
 #include "core/scene/self_pairs.hpp"
 #include "core/topology/leaf_pairs.hpp"
-#include "core/topology/ray_traversal.hpp"
+#include "core/topology/probe_traversal.hpp"
 
 namespace kbvh {
 namespace {
@@ -22,7 +22,7 @@ class KineticSeparationList final : public CountedStrategy<S>,
                                     public AnswersSelfPairs,
                                     public AnswersSpans<S>,
                                     public AnswersSweeps<S>,
-                                    public AnswersRays<S>,
+                                    public AnswersProbes<S>,
                                     public EventSource<S>,
                                     public TakesPlanChanges<S>,
                                     public TakesGeometryChanges<S> {
@@ -99,8 +99,7 @@ class KineticSeparationList final : public CountedStrategy<S>,
   }
 
   /// Follows rays node by node, in boxes that are computed from their realisers.
-  void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
-                 std::span<RayHit> hits) override {
+  void answer_probes(double /*t*/, const Probes<S>& probes) override {
     auto& forest = collision_.forest();
     while (ray_boxes_.size() < this->scene_.body_count()) ray_boxes_.emplace_back(0);
     for (std::uint32_t body = 0; body < ray_boxes_.size(); ++body) {
@@ -116,17 +115,17 @@ class KineticSeparationList final : public CountedStrategy<S>,
       boxes.ensure(0);
       return Box<S>(boxes(0));
     };
-    const std::uint64_t all = find_hits_by_body(
-        this->scene_, this->sampled_, query, rays, hits, ray_order_, this->ray_bodies(), box_of,
-        [&](std::uint32_t body, RaySearch<S>& search, std::uint64_t& tests) {
+    const std::uint64_t all = answer_by_body(
+        this->scene_, this->sampled_, probes, probe_order_, this->ray_bodies(), box_of,
+        [&](std::uint32_t body, auto& search, std::uint64_t& tests) {
           const Topology& topology = forest.tree(body).topology();
           auto boxes = boxes_of(body);
           const TopologyTree tree{topology, [&](std::uint32_t node) {
                                     boxes.ensure(node);
                                     return boxes(node);
                                   }};
-          return follow_ray(tree, search, body, this->scene_.primitives(body), this->sampled_.positions(body),
-                            ray_stack_, tests, this->triangle_stats_);
+          return follow_probe(tree, search, body, this->scene_.primitives(body),
+                              this->sampled_.positions(body), probe_stack_, tests, this->triangle_stats_);
         });
     this->count_.add(Counter::box_tests, all);
   }
@@ -222,8 +221,8 @@ class KineticSeparationList final : public CountedStrategy<S>,
   }
 
   std::size_t bytes() const override {
-    std::size_t total = rows_.bytes() + open_.capacity() * sizeof(std::uint32_t) + ray_order_.bytes() +
-                        ray_stack_.capacity() * sizeof(RayNode<std::uint32_t>);
+    std::size_t total = rows_.bytes() + open_.capacity() * sizeof(std::uint32_t) + probe_order_.bytes() +
+                        probe_stack_.capacity() * sizeof(ProbeNode<std::uint32_t>);
     for (const auto& boxes : ray_boxes_) total += boxes.bytes();
     return total + collision_.bytes();
   }
@@ -311,8 +310,8 @@ class KineticSeparationList final : public CountedStrategy<S>,
   bool notes_changes_;                  ///< the list's leaves are the candidates
   KineticRowsQuery<S> rows_;            ///< empty unless by_rows_
   std::vector<BoxCache<S>> ray_boxes_;  ///< [body], made at the first request for rays
-  std::vector<RayNode<std::uint32_t>> ray_stack_;
-  RayBodyOrder ray_order_;
+  std::vector<ProbeNode<std::uint32_t>> probe_stack_;
+  BodyOrder probe_order_;
   std::uint64_t first_step_ = 0;
   std::size_t vertices_ = 0;      ///< of the initial scene
   bool many_candidates_ = false;  ///< in the last frame

@@ -6,14 +6,14 @@
 #include "core/families/linear/linear_bounds.hpp"
 
 #include "core/contract/registry.hpp"
-#include "core/families/linear/linear_rays.hpp"
+#include "core/families/linear/linear_probes.hpp"
 
 namespace kbvh {
 namespace {
 
 template <class S>
 class LinearBoundsStrategy final : public CountedStrategy<S>,
-                                   public AnswersRays<S>,
+                                   public AnswersProbes<S>,
                                    public TakesPlanChanges<S> {
  public:
   static constexpr Foresight foresight = Foresight::next_keyframe;
@@ -56,9 +56,9 @@ class LinearBoundsStrategy final : public CountedStrategy<S>,
     return status;
   }
 
-  void find_hits(double t, RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits) override {
+  void answer_probes(double t, const Probes<S>& probes) override {
     std::uint64_t tests = 0;
-    rays_.find(bounds_, t, stale_, query, rays, hits, this->triangle_stats_, tests, this->ray_bodies());
+    probes_.answer(bounds_, t, stale_, probes, this->triangle_stats_, tests, this->ray_bodies());
     this->count_.add(Counter::box_tests, tests);
   }
 
@@ -73,7 +73,7 @@ class LinearBoundsStrategy final : public CountedStrategy<S>,
   }
 
   std::size_t bytes() const override {
-    std::size_t total = bounds_.bytes() + query_.bytes() + rays_.bytes();
+    std::size_t total = bounds_.bytes() + query_.bytes() + probes_.bytes();
     for (const auto& marks : stale_) total += marks.size();
     return total;
   }
@@ -99,7 +99,7 @@ class LinearBoundsStrategy final : public CountedStrategy<S>,
 
   LinearBounds<S> bounds_;
   WideQuery<S> query_{this->scene_, this->sampled_};
-  LinearRays<S> rays_{this->scene_, this->sampled_};
+  LinearProbes<S> probes_{this->scene_, this->sampled_};
   std::vector<std::vector<std::uint8_t>> stale_;  ///< [body][wide node]
   LinearCounts<S> updates_;
 };

@@ -15,8 +15,8 @@
 #include "core/contract/registry.hpp"
 #include "core/families/restructure/moving_tree.hpp"
 #include "core/families/wide/near_bodies.hpp"
+#include "core/families/wide/wide_probes.hpp"
 #include "core/families/wide/wide_query.hpp"
-#include "core/families/wide/wide_rays.hpp"
 #include "core/topology/topology_edit.hpp"
 
 namespace kbvh {
@@ -25,7 +25,7 @@ namespace {
 template <class S>
 class Reinsertion final : public CountedStrategy<S>,
                           public AnswersSelfPairs,
-                          public AnswersRays<S>,
+                          public AnswersProbes<S>,
                           public TakesPlanChanges<S>,
                           public TakesGeometryChanges<S> {
  public:
@@ -50,7 +50,7 @@ class Reinsertion final : public CountedStrategy<S>,
   void reset_to(double /*t*/) override {
     plans_changed_ = false;
     near_bodies_.start_over();
-    rays_.start_over();
+    probes_.start_over();
     for (std::uint32_t body = 0; body < bodies_.size(); ++body) {
       if (bodies_[body].moved) assign(body);
       bodies_[body].start_over();
@@ -95,18 +95,17 @@ class Reinsertion final : public CountedStrategy<S>,
   std::size_t bytes() const override {
     std::size_t total = bodies_.capacity() * sizeof(Body) + scores_.capacity() * sizeof(S) +
                         chosen_.capacity() * sizeof(Scored) + near_bodies_.bytes() + query_.bytes() +
-                        rays_.bytes();
+                        probes_.bytes();
     for (const Body& body : bodies_) total += body.tree.bytes();
     for (const Topology& topology : start_) total += topology.bytes();
     return total;
   }
 
  protected:
-  void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
-                 std::span<RayHit> hits) override {
+  void answer_probes(double /*t*/, const Probes<S>& probes) override {
     std::uint64_t tests = 0;
-    rays_.find(
-        query, rays, hits, [&](std::uint32_t body) { return side(body); }, this->triangle_stats_, tests,
+    probes_.answer(
+        probes, [&](std::uint32_t body) { return side(body); }, this->triangle_stats_, tests,
         this->ray_bodies());
     this->count_.add(Counter::box_tests, tests);
   }
@@ -232,7 +231,7 @@ class Reinsertion final : public CountedStrategy<S>,
   std::vector<Body> bodies_;
   NearBodies near_bodies_;
   WideQuery<S> query_{this->scene_, this->sampled_};
-  WideRays<S> rays_{this->scene_, this->sampled_};
+  WideProbes<S> probes_{this->scene_, this->sampled_};
   std::vector<S> scores_;
   std::vector<Scored> chosen_;
   bool plans_changed_ = false;

@@ -48,6 +48,8 @@ def asked(row: Any) -> str:
     """Returns what a cell asks for, from the record of one of its contestants."""
     if row["rays"]:
         return "rays"
+    if row["within"]:
+        return "primitives near points"
     if row["continuous"]:
         return "contacts between keyframes"
     if row["answer"]:

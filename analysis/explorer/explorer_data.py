@@ -206,7 +206,13 @@ def _asked(row: pd.Series) -> dict[str, Any]:
 
     Read from the scene, because records of rays from before `asked_of` (experiments/study/plan.hpp) lack it in `again`.
     """
-    asked = {"continuous": bool(row["continuous"]), "changes": row["answer"], "rays": row["rays"], "kernels": row["held_to"]}
+    asked = {
+        "continuous": bool(row["continuous"]),
+        "changes": row["answer"],
+        "rays": row["rays"],
+        "within": row["within"],
+        "kernels": row["held_to"],
+    }
     return {key: value for key, value in asked.items() if value}
 
 

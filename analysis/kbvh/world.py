@@ -284,6 +284,26 @@ class World:
                 warnings.warn(f"{changed} {whose} rounded to float32, the precision of the world", stacklevel=2)
         return self._core.hits(rays, query == "any")
 
+    def within(self, points: npt.ArrayLike, radius: npt.ArrayLike) -> Array:
+        """Returns the primitives within a distance of points, [point][3], at the current time: a structured array with the fields
+        point, body and primitive, sorted. The radius is one number or one for each point. Squared distances are compared exactly
+        with the squared radius; polygons and points are met, control nets are not. Points and radii are rounded to the world's
+        precision.
+
+        >>> world = kbvh.World([kbvh.Body([0, 1, 2], np.eye(3))], "bottom_up")
+        >>> world.within([[1, 1, 1], [2, 0, 0]], 1).tolist()
+        [(1, 0, 0)]
+        """
+        centres = np.atleast_2d(_real(points, "points"))
+        balls = np.empty((len(centres), 4))
+        try:
+            balls[:, :3], balls[:, 3] = centres, _real(radius, "radii")
+        except ValueError as reason:
+            if "real numbers" in str(reason):
+                raise
+            raise ValueError(f"{len(centres)} points are [point][3] and have one radius, or one each") from None
+        return self._core.within(balls)
+
     def next_knot(self) -> float:
         """Returns the next time at which the plan of any vertex bends; infinite if none does."""
         return self._core.next_knot()

@@ -259,6 +259,7 @@ def _row(record: _Record, index: int) -> dict[str, Any]:
         "changes": _changes(record),
         "answer": record.text("scene.changes", ""),
         "rays": record.text("scene.rays", ""),
+        "within": record.text("scene.within", ""),
         "held_to": record.text("scene.kernels", ""),
         "changed_per_frame": _changed_per_frame(record),
         "hash": str(record.get("scene.hash", "")),

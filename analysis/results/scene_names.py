@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 
 #: The end of a scene's name that tells what was asked instead of pairs at frames, and the kernels that a study holds kbvh to.
-ANSWER = re.compile(r"( \((contacts|changes of (candidates|pairs)|(in)?coherent rays(, any)?|\w+ kernels)\))*$")
+ANSWER = re.compile(r"( \((contacts|changes of (candidates|pairs)|(in)?coherent rays(, any)?|within [\d.e-]+|\w+ kernels)\))*$")
 
 
 def family(name: str, bodies: Any) -> str:

@@ -3,7 +3,7 @@
 
 #include "core/scene/geometry_change.hpp"
 #include "core/scene/pairs.hpp"
-#include "core/scene/rays.hpp"
+#include "core/scene/probes.hpp"
 
 namespace kbvh {
 
@@ -61,7 +61,7 @@ class AnswersSweeps {
   virtual void find_swept_pairs(double t0, double t1, std::span<const S* const> before, PairBuffer& out) = 0;
 };
 
-/// Answers which primitives rays meet.
+/// Answers which primitives rays meet, and no other probes (a peer library).
 template <class S>
 class AnswersRays {
  public:
@@ -69,9 +69,22 @@ class AnswersRays {
 
  protected:
   friend class Strategy<S>;
-  /// Implements `Strategy::hits_at`: sets hits[i] to the answer to rays[i]; both have the same length. The
-  /// strategy stands at t. Lazy strategies refresh what the rays read, positions included.
-  virtual void find_hits(double t, RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits) = 0;
+  /// Implements `Strategy::probe_at` for rays: sets hits[i] to the answer to rays[i]. The strategy stands at
+  /// t. Lazy strategies refresh what the rays read, positions included.
+  virtual void find_hits(double t, const RayProbes<S>& rays) = 0;
+};
+
+/// Answers probes of every kind. The value says what is asked; shared traversals answer it, and a strategy
+/// passes it on.
+template <class S>
+class AnswersProbes : public AnswersRays<S> {
+ protected:
+  friend class Strategy<S>;
+  /// Implements `Strategy::probe_at`, under the same conditions as `find_hits`.
+  virtual void answer_probes(double t, const Probes<S>& probes) = 0;
+
+ private:
+  void find_hits(double t, const RayProbes<S>& rays) final { answer_probes(t, rays); }
 };
 
 /// Follows flight plans that change at run time.

@@ -47,6 +47,7 @@ Capabilities capabilities(const Declared& declared) {
           .contacts = has<T, AnswersSweeps<S>>(),
           .changes = has<T, AnswersChanges<S>>(),
           .rays = has<T, AnswersRays<S>>(),
+          .probes = has<T, AnswersProbes<S>>(),
           .curves = declared.curves || T::foresight <= Foresight::step_bound};
 }
 template <template <class> class T, class S>

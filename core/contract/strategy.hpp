@@ -65,7 +65,8 @@ struct Capabilities {
       false;  ///< AnswersSelfPairs: pairs within a body; without it, scenes that ask for them are refused
   bool contacts = false;  ///< AnswersSweeps: the broad phase of continuous collision detection
   bool changes = false;   ///< AnswersChanges: changes of answers without a comparison of full answers
-  bool rays = false;      ///< AnswersRays: hits_at
+  bool rays = false;      ///< AnswersRays: probe_at with rays
+  bool probes = false;    ///< AnswersProbes: probe_at with any probes
   /// Plays scenes whose vertices move on curves (FlightPlans::curved): declared, or implied by a foresight of
   /// positions and displacement bounds alone.
   bool curves = false;
@@ -92,7 +93,8 @@ struct Info {
   bool baseline = false;
   Tightness tightness = Tightness::tight;
   Guarantee guarantee = Guarantee::exact;
-  /// The promise that `hits_at` makes: exact, or approximate for a peer's own test of rays and triangles.
+  /// The promise that `probe_at` makes for rays: exact, or approximate for a peer's own test of rays and
+  /// triangles.
   Guarantee rays_guarantee = Guarantee::exact;
   PositionUse positions = PositionUse::all;
   Declared declares{};
@@ -242,18 +244,18 @@ class Strategy {
     query.find_swept_pairs(t0, t1, before, out);
   }
 
-  /// Answers rays at t, hits[i] being the answer to rays[i]. Rays meet all primitives of the scene, also
-  /// those of bodies in no pair. Positions are fetched as needed. Throws std::invalid_argument, naming the
-  /// ray, if a coordinate or direction is not finite or beyond admissible_magnitude<S>, or if a length is
-  /// negative or not a number.
-  void hits_at(double t, RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits) {
-    AnswersRays<S>& able_to = able(abilities().rays, "rays");
-    if (hits.size() != rays.size())
-      throw std::invalid_argument(std::to_string(rays.size()) + " rays take as many answers, not " +
-                                  std::to_string(hits.size()));
-    check_rays(rays);
+  /// Answers probes at t: rays, or another kind (core/scene/probes.hpp). They meet all primitives of the
+  /// scene, also those of bodies in no pair. Positions are fetched as needed. Throws like `check_probes`.
+  void probe_at(double t, const Probes<S>& probes) {
+    const RayProbes<S>* const rays = std::get_if<RayProbes<S>>(&probes);
+    AnswersRays<S>* const for_rays = rays != nullptr ? &able(abilities().rays, "rays") : nullptr;
+    AnswersProbes<S>* const for_any = rays == nullptr ? &able(abilities().probes, "probes") : nullptr;
+    check_probes(probes);
     stand_at(t);
-    able_to.find_hits(t, query, rays, hits);
+    if (rays != nullptr)
+      for_rays->find_hits(t, *rays);
+    else
+      for_any->answer_probes(t, probes);
   }
 
   /// Reports that the plans of some vertices changed at t; the motion view shows the new plans. Each new plan
@@ -360,6 +362,7 @@ class Strategy {
     AnswersSpans<S>* spans;
     AnswersSweeps<S>* sweeps;
     AnswersRays<S>* rays;
+    AnswersProbes<S>* probes;
     TakesPlanChanges<S>* plan_changes;
     TakesGeometryChanges<S>* geometry_changes;
     EventSource<S>* events;
@@ -368,10 +371,10 @@ class Strategy {
   /// Determined at the first call, because the object is not complete during construction.
   const Abilities& abilities() {
     if (!abilities_)
-      abilities_ = {dynamic_cast<AnswersSpans<S>*>(this),         dynamic_cast<AnswersSweeps<S>*>(this),
-                    dynamic_cast<AnswersRays<S>*>(this),          dynamic_cast<TakesPlanChanges<S>*>(this),
-                    dynamic_cast<TakesGeometryChanges<S>*>(this), dynamic_cast<EventSource<S>*>(this),
-                    dynamic_cast<AnswersChanges<S>*>(this)};
+      abilities_ = {dynamic_cast<AnswersSpans<S>*>(this),     dynamic_cast<AnswersSweeps<S>*>(this),
+                    dynamic_cast<AnswersRays<S>*>(this),      dynamic_cast<AnswersProbes<S>*>(this),
+                    dynamic_cast<TakesPlanChanges<S>*>(this), dynamic_cast<TakesGeometryChanges<S>*>(this),
+                    dynamic_cast<EventSource<S>*>(this),      dynamic_cast<AnswersChanges<S>*>(this)};
     return *abilities_;
   }
   template <class Interface>

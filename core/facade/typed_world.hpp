@@ -47,6 +47,8 @@ struct TypedWorld {
   ContactBuffer contacts;
   std::vector<Ray<S>> rays;
   std::vector<RayHit> hits;
+  std::vector<Ball<S>> balls;
+  BallHits ball_hits;
   EventDescription<S> done;
 
   void check_not_started() const {

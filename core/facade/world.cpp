@@ -1,5 +1,6 @@
 #include "core/facade/world.hpp"
 
+#include <algorithm>
 #include <utility>
 #include <variant>
 
@@ -188,9 +189,23 @@ void World::hits(WorldRayQuery query, std::span<const WorldRay> rays, std::vecto
     world.rays.clear();
     for (const WorldRay& ray : rays) world.rays.push_back(typed<S>(ray));
     world.hits.resize(rays.size());
-    world.session().hits(RayQuery(query), world.rays, std::span<RayHit>(world.hits), world.ignored);
+    world.session().probe(RayProbes<S>{RayQuery(query), world.rays, std::span<RayHit>(world.hits)},
+                          world.ignored);
     out.clear();
     for (const RayHit& hit : world.hits) out.push_back({hit.body, hit.primitive, hit.parameter});
+  });
+}
+
+void World::within(std::span<const WorldBall> balls, std::vector<WorldBallHit>& out) {
+  in_scalar([&]<class S>(TypedWorld<S>& world) {
+    world.balls.clear();
+    for (const auto& [centre, radius] : balls)
+      world.balls.push_back({{S(centre[0]), S(centre[1]), S(centre[2])}, S(radius)});
+    world.ball_hits.clear();
+    world.session().probe(BallProbes<S>{world.balls, &world.ball_hits}, world.ignored);
+    std::sort(world.ball_hits.begin(), world.ball_hits.end());
+    out.clear();
+    for (const BallHit& hit : world.ball_hits) out.push_back({hit.ball, hit.body, hit.primitive});
   });
 }
 

@@ -71,6 +71,17 @@ struct WorldHit {
   bool operator==(const WorldHit&) const = default;
 };
 
+/// A closed ball: sought are the primitives at a distance of at most `radius` from `centre`.
+struct WorldBall {
+  double centre[3] = {0, 0, 0}, radius = 0;
+};
+
+/// A primitive within a ball, by the index of the ball in the call.
+struct WorldBallHit {
+  std::uint32_t ball, body, primitive;
+  auto operator<=>(const WorldBallHit&) const = default;
+};
+
 /// A node of a body's hierarchy and its box. Parents have smaller numbers than their children; node 0 is the
 /// root.
 struct WorldNode {
@@ -303,6 +314,10 @@ class World {
   /// Replaces `out` by the answers to rays at the current time, one for each, under the strategy's guarantee
   /// of rays. Rays are rounded to the world's precision.
   void hits(WorldRayQuery query, std::span<const WorldRay> rays, std::vector<WorldHit>& out);
+  /// Replaces `out` by the primitives within balls at the current time, sorted. Squared distances are
+  /// compared exactly with the squared radius; polygons and points are met, control nets are not. Balls are
+  /// rounded to the world's precision.
+  void within(std::span<const WorldBall> balls, std::vector<WorldBallHit>& out);
   /// Returns the next time at which the plan of any vertex bends; infinite if none does.
   double next_knot() const;
   /// Replaces `out` by the positions of a body at the current time.

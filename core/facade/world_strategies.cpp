@@ -44,6 +44,7 @@ std::vector<std::string> words(const Capabilities& can) {
                                               {can.time_budget, "time_budget"},
                                               {can.contacts, "contacts"},
                                               {can.rays, "rays"},
+                                              {can.probes, "within"},
                                               {can.changes, "changes"}};
   std::vector<std::string> out;
   for (const auto& [has, word] : all)

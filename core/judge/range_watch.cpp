@@ -118,12 +118,16 @@ void RangeWatch<S>::check_added(const GeometryChange<S>& change) const {
 }
 
 template <class S>
-void RangeWatch<S>::check_rays(std::span<const Ray<S>> rays) const {
+void RangeWatch<S>::check_probes(const Probes<S>& probes) const {
   if (!narrow()) return;
-  for (std::size_t i = 0; i < rays.size(); ++i) {
-    check_point(rays[i].origin, "the origin of ray " + std::to_string(i));
-    check_point(rays[i].direction, "the direction of ray " + std::to_string(i));
-  }
+  if (const auto* rays = std::get_if<RayProbes<S>>(&probes))
+    for (std::size_t i = 0; i < rays->size(); ++i) {
+      check_point(rays->rays[i].origin, "the origin of ray " + std::to_string(i));
+      check_point(rays->rays[i].direction, "the direction of ray " + std::to_string(i));
+    }
+  if (const auto* balls = std::get_if<BallProbes<S>>(&probes))
+    for (std::size_t i = 0; i < balls->size(); ++i)
+      check_point(balls->balls[i].centre, "the centre of ball " + std::to_string(i));
 }
 
 template <class S>
@@ -209,9 +213,9 @@ std::string out_of_range(const Info& contestant, const Scene<S>& scene, const Pl
 }
 
 template <class S>
-std::string out_of_range(const Info& contestant, std::span<const Ray<S>> rays) {
+std::string out_of_range(const Info& contestant, const Probes<S>& probes) {
   try {
-    RangeWatch<S>(contestant).check_rays(rays);
+    RangeWatch<S>(contestant).check_probes(probes);
   } catch (const BeyondContestant& why) {
     return why.clause;
   }
@@ -223,7 +227,7 @@ std::string out_of_range(const Info& contestant, std::span<const Ray<S>> rays) {
   template void check_played(const Scene<S>&, const PlanScript<S>&, std::span<const double>); \
   template std::string out_of_range(const Info&, const Scene<S>&, const PlanScript<S>&,       \
                                     std::span<const double>);                                 \
-  template std::string out_of_range(const Info&, std::span<const Ray<S>>);
+  template std::string out_of_range(const Info&, const Probes<S>&);
 KBVH_INSTANTIATE(float)
 KBVH_INSTANTIATE(double)
 #undef KBVH_INSTANTIATE

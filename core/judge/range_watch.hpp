@@ -37,7 +37,7 @@ class RangeWatch {
   void check_positions(std::uint32_t body, std::uint32_t vertices, const S* positions) const;
   void check_plans(std::span<const PlanChange<S>> changes) const;
   void check_added(const GeometryChange<S>& change) const;
-  void check_rays(std::span<const Ray<S>> rays) const;
+  void check_probes(const Probes<S>& probes) const;
 
  private:
   bool narrow() const { return !contestant_.empty(); }
@@ -66,9 +66,9 @@ template <class S>
 std::string out_of_range(const Info& contestant, const Scene<S>& scene, const PlanScript<S>& script,
                          std::span<const double> frames);
 
-/// Does the same for rays.
+/// Does the same for probes.
 template <class S>
-std::string out_of_range(const Info& contestant, std::span<const Ray<S>> rays);
+std::string out_of_range(const Info& contestant, const Probes<S>& probes);
 
 extern template class RangeWatch<float>;
 extern template class RangeWatch<double>;

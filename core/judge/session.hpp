@@ -119,11 +119,11 @@ class Session {
   void changes(Answer answer, PairBuffer& begun, PairBuffer& ended, PhaseTimes& times) {
     timed(times.traversal, [&] { strategy_->changes_at(playback_.time(), answer, begun, ended); });
   }
-  /// Answers rays at the current time (Strategy::hits_at). All of this time counts as traversal. Throws
-  /// std::invalid_argument if a ray is beyond the range of the contestant.
-  void hits(RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits, PhaseTimes& times) {
-    watch_.check_rays(rays);
-    timed(times.traversal, [&] { strategy_->hits_at(playback_.time(), query, rays, hits); });
+  /// Answers probes at the current time (Strategy::probe_at). All of this time counts as traversal. Throws
+  /// std::invalid_argument if a probe is beyond the range of the contestant.
+  void probe(const Probes<S>& probes, PhaseTimes& times) {
+    watch_.check_probes(probes);
+    timed(times.traversal, [&] { strategy_->probe_at(playback_.time(), probes); });
   }
   /// Performs the first event if it is due by time `until` (Strategy::step_event); the motion keeps its time
   /// until the next `advance`.

@@ -6,6 +6,8 @@
 #include <string>
 #include <tuple>
 
+#include "core/motion/admissible.hpp"
+
 namespace kbvh {
 
 template <class S>

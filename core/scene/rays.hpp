@@ -3,6 +3,7 @@
 #include <limits>
 #include <span>
 
+#include "core/geometry/ray_box.hpp"
 #include "core/geometry/ray_triangle.hpp"
 #include "core/scene/scene.hpp"
 
@@ -71,6 +72,8 @@ class RaySearch {
   /// Returns a parameter beyond which nothing can be the answer.
   double limit() const { return hit_ ? best_.parameter + best_.error : line_.length; }
   const RayLine& line() const { return line_; }
+  /// Returns the test of boxes, whose `meet` never misses a box that the ray meets.
+  RaySlabs box_test() const { return RaySlabs(line_); }
   const RayHit& hit() const { return hit_; }
 
  private:

@@ -33,7 +33,7 @@ int run_and_wait(std::vector<std::string> words);
 /// The options of `run` and `bench` on the command line. Strings stay as given until `plan_of` turns them
 /// into the equivalent plan.
 struct StudyOptions {
-  std::string plan_file, out, scene, name, clip, script, changes, rays, kernels, job, prepare;
+  std::string plan_file, out, scene, name, clip, script, changes, rays, within, kernels, job, prepare;
   std::vector<std::string> bodies, strategies, scalars, params, studies, orders, builders;
   std::vector<std::uint64_t> triangles, seeds, l, widths, leaf_sizes;
   std::uint64_t obstacle = 0, keyframes = 0, repetitions = 0, frames_limit = 0, oracle_every = 0;

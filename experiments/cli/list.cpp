@@ -43,6 +43,7 @@ std::vector<std::string> capabilities_of(const Info& info) {
                                               {info.can.contacts, "contacts"},
                                               {info.can.changes, "changes"},
                                               {info.can.rays, "rays"},
+                                              {info.can.probes, "within"},
                                               {info.can.curves, "curves"}};
   std::vector<std::string> words;
   for (const auto& [can, word] : all)

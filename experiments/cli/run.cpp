@@ -185,6 +185,10 @@ void add_study(CLI::App& command, const std::shared_ptr<StudyOptions>& o) {
       add_text(command, "--rays", o->rays,
                "ask for rays instead of pairs: coherent or incoherent, then :count and :any, as in "
                "incoherent:10000:any"),
+      add_text(
+          command, "--within", o->within,
+          "ask for the primitives near random points instead of pairs: COUNT:RADIUS, the radius as a share "
+          "of the diagonal of the scene's box, as in 1000:0.01"),
       add_text(command, "--kernels", o->kernels,
                "hold kbvh to an instruction set: portable, sse, avx2, avx512 (the widest that runs here)"),
       command.add_flag(
@@ -283,6 +287,7 @@ json plan_of(const StudyOptions& options) {
   if (options.continuous) plan["continuous"] = true;
   if (!options.changes.empty()) plan["changes"] = options.changes;
   if (!options.rays.empty()) plan["rays"] = options.rays;
+  if (!options.within.empty()) plan["within"] = options.within;
   if (!options.kernels.empty()) plan["kernels"] = options.kernels;
   set_common(plan, options);
   return plan;

@@ -89,7 +89,7 @@ json again_record(const json& scene_object, const json& scene, const json& strat
             {"seconds", study.seconds},
             {"oracle_every", study.oracle_every}};
   if (study.frames_limit > 0) plan["frames_limit"] = study.frames_limit;
-  plan.update(asked_of(study));
+  plan.update(asked_of(study.asks));
   return plan;
 }
 
@@ -114,7 +114,7 @@ std::string configuration_key(const std::string& program, const json& scene, con
            {"machine",
             {machine.at("cpu"), machine.at("compiler"), machine.at("flags"), machine.at("build_type"),
              machine.at("kernels")}}};
-  all.update(asked_of(study));
+  all.update(asked_of(study.asks));
   if (scene.contains("script")) all["script"] = scene.at("script").at("hash");
   return hexadecimal(hash_of(all.dump()));
 }

@@ -49,6 +49,7 @@ constexpr Field fields[] = {
     {"scene.continuous", Kind::truth, Needed::if_there},
     {"scene.changes", Kind::text, Needed::if_there},
     {"scene.rays", Kind::text, Needed::if_there},
+    {"scene.within", Kind::text, Needed::if_there},
     {"scene.kernels", Kind::text, Needed::if_there},
     {"scene.script", Kind::object, Needed::if_there},
     {"scene.script.steps", Kind::whole},

@@ -60,7 +60,8 @@ std::string truth_of(const std::vector<json>& records, const json& scene, const 
     found = whole("pairs");
   }
   if (most == 0) return {};
-  const char* const noun = scene.contains("rays")             ? "true hit"
+  const bool of_probes = scene.contains("rays") || scene.contains("within");
+  const char* const noun = of_probes                          ? "true hit"
                            : scene.value("continuous", false) ? "true contact"
                                                               : "true pair";
   return ", " + counted(found, noun) + " in " + counted(most, "compared " + step);

@@ -132,7 +132,7 @@ json scene_rows(const Target& target, const std::vector<TargetGroup>& groups) {
     if (!is_measured_as(target, group)) continue;
     // One scene may be asked for pairs and for rays, and by other kernels.
     const std::string hash = group.scene.at("hash").get<std::string>() + group.scene.value("rays", "") +
-                             group.scene.value("kernels", "");
+                             group.scene.value("within", "") + group.scene.value("kernels", "");
     const auto known =
         std::find_if(rows.begin(), rows.end(), [&](const auto& row) { return row.first == hash; });
     if (known == rows.end())

@@ -6,7 +6,6 @@
 
 #include "experiments/common/machine.hpp"
 #include "experiments/common/text.hpp"
-#include "experiments/study/ray_measurement.hpp"
 
 namespace kbvh::experiments {
 
@@ -72,7 +71,7 @@ std::uint32_t threads_of(const std::vector<ContestantSpec>& contestants) {
 
 /// Returns the l at which a study plays a scene: 1 where l does not apply.
 std::vector<std::uint32_t> steps_of(const Study& study, const SceneSpec& spec) {
-  if (study.continuous || has_own_frames(spec)) return {1};
+  if (study.asks.continuous || has_own_frames(spec)) return {1};
   return study.per_keyframe;
 }
 
@@ -106,14 +105,11 @@ std::vector<Job> jobs_of(const Plan& plan, std::vector<std::string>& notes) {
           job.per_keyframe = l;
           job.configurations = contestants.size();
           job.threads = threads_of(contestants);
-          job.id = id_of(name_of(spec) + "-" + scalar +
-                             (study.continuous ? "-contacts" : "-l" + std::to_string(l)) +
-                             (study.changes ? "-changes"
-                              : study.rays  ? "-rays"
-                                            : "") +
-                             (study.kernels ? "-" + std::string(name(*study.kernels)) : ""),
-                         {job.scene, scalar, l, study.repetitions, study.interval_width, study.seconds,
-                          study.frames_limit, study.oracle_every, asked_of(study), content_of(contestants)});
+          job.id = id_of(
+              name_of(spec) + "-" + scalar +
+                  (study.asks.continuous ? "-contacts" : "-l" + std::to_string(l)) + job_words(study.asks),
+              {job.scene, scalar, l, study.repetitions, study.interval_width, study.seconds,
+               study.frames_limit, study.oracle_every, asked_of(study.asks), content_of(contestants)});
           if (known.insert(job.id).second) jobs.push_back(std::move(job));
         }
     }

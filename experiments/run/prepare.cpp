@@ -82,7 +82,7 @@ void prepare_scene(const Plan& plan, const std::string& id, const std::filesyste
     for (const std::size_t place : places) {
       const Study& study = plan.studies[place];
       const bool plays = std::find(study.scalars.begin(), study.scalars.end(), scalar) != study.scalars.end();
-      if (plays && !study.continuous && !study.rays) studies.push_back(&study);
+      if (plays && study.asks.of_pairs()) studies.push_back(&study);
     }
     if (studies.empty()) continue;
     if (std::string(scalar) == "float")

@@ -24,7 +24,7 @@
 #include "experiments/run/scene_pictures.hpp"
 #include "experiments/run/time_left.hpp"
 #include "experiments/study/contact_measurement.hpp"
-#include "experiments/study/ray_measurement.hpp"
+#include "experiments/study/probe_measurement.hpp"
 #include "experiments/study/targets.hpp"
 #include "experiments/study/times_record.hpp"
 
@@ -99,15 +99,15 @@ class Runner {
       use_kernel_set(usual);
       machine_["kernels"] = name(usual);
     };
-    if (study.kernels) {
+    if (study.asks.kernels) {
       try {
-        use_kernel_set(*study.kernels);
+        use_kernel_set(*study.asks.kernels);
       } catch (const std::invalid_argument& problem) {
         note("note: the study '" + study.name + "' is skipped: " + problem.what());
         for (std::size_t i = 0; i < study.scenes.size(); ++i) left_.begin_scene();
         return;
       }
-      machine_["kernels"] = name(*study.kernels);
+      machine_["kernels"] = name(*study.asks.kernels);
     }
     try {
       scenes(study, contestants);
@@ -173,10 +173,10 @@ class Runner {
   }
 
   /// Warns of a scene of one body: it has times, but its query has nothing to find, which is seldom intended.
-  /// Rays meet a body alone.
+  /// Rays and points meet a body alone.
   template <class S>
   void warn_of_no_pairs(const Scene<S>& scene, const Study& study) {
-    if (!scene.pairs.empty() || study.rays) return;
+    if (!scene.pairs.empty() || study.asks.probes) return;
     note("warning: " + scene.name +
          " has one body, so there are no pairs of bodies, and nothing is found or compared; --self (in a "
          "plan: \"self\": true) asks for pairs within it");
@@ -187,13 +187,13 @@ class Runner {
     const Scene<S> scene = assemble<S>(loaded);
     warn_of_no_pairs(scene, study);
     const PlanScript<S> script = script_of(scene, loaded, making_);
-    if (study.continuous) {
+    if (study.asks.continuous) {
       contact_group(study, contestants, loaded, scene, script);
       return;
     }
-    if (study.rays) {
+    if (study.asks.probes) {
       for_each_l(study, loaded, scene, script, [&](std::uint32_t l, const std::vector<double>& frames) {
-        ray_group(study, contestants, loaded, scene, script, l, frames);
+        probe_group(study, contestants, loaded, scene, script, l, frames);
       });
       return;
     }
@@ -227,32 +227,33 @@ class Runner {
              const Scene<S>& scene, const PlanScript<S>& script, Oracle<S>& oracle, std::uint32_t l,
              const std::vector<double>& frames) {
     json about_scene = scene_record(scene, loaded, l, frames, script);
-    about_scene.update(asked_of(study));
-    about_scene["name"] =
-        name_with_changes(scene.name + suffix_of(study), study.changes ? answer_word(*study.changes) : "");
+    about_scene.update(asked_of(study.asks));
+    about_scene["name"] = scene.name + suffix_of(study.asks);
     const std::string title = about_scene["name"].get<std::string>() + ", l = " + std::to_string(l);
     if (l > 1 && study.oracle_every % l == 0)
       note("warning: with oracle_every " + std::to_string(study.oracle_every) +
            " and l = " + std::to_string(l) +
            " only keyframes are compared with the truth; take a number without common factors");
-    Measurement<S> measurement(scene, frames, oracle, script.empty() ? nullptr : &script, study.changes);
+    Measurement<S> measurement(scene, frames, oracle, script.empty() ? nullptr : &script, study.asks.changes);
     measure_all(study, contestants, loaded, about_scene, title, measurement,
                 [&](const Info& info) { return unsuitable(info, scene, script, frames); });
   }
 
-  /// Does the same for rays.
+  /// Does the same for rays and points.
   template <class S>
-  void ray_group(const Study& study, const std::vector<ContestantSpec>& contestants,
-                 const LoadedScene& loaded, const Scene<S>& scene, const PlanScript<S>& script,
-                 std::uint32_t l, const std::vector<double>& frames) {
+  void probe_group(const Study& study, const std::vector<ContestantSpec>& contestants,
+                   const LoadedScene& loaded, const Scene<S>& scene, const PlanScript<S>& script,
+                   std::uint32_t l, const std::vector<double>& frames) {
     json about_scene = scene_record(scene, loaded, l, frames, script);
-    about_scene.update(asked_of(study));
-    about_scene["name"] = scene.name + suffix_of(study);
-    RayMeasurement<S> measurement(scene, frames, *study.rays, script.empty() ? nullptr : &script);
+    about_scene.update(asked_of(study.asks));
+    about_scene["name"] = scene.name + suffix_of(study.asks);
+    ProbeMeasurement<S> measurement(scene, frames, *study.asks.probes, script.empty() ? nullptr : &script);
     measure_all(study, contestants, loaded, about_scene,
-                scene.name + ", l = " + std::to_string(l) + suffix_of(study), measurement,
+                scene.name + ", l = " + std::to_string(l) + suffix_of(study.asks), measurement,
                 [&](const Info& info) -> std::string {
-                  if (!info.can.rays) return "answers no rays";
+                  if (!answers(info, *study.asks.probes))
+                    return std::string("answers no ") +
+                           (key_of(*study.asks.probes) == std::string("rays") ? "rays" : "points");
                   if (std::string why = unsuitable(info, scene, script, frames); !why.empty()) return why;
                   return measurement.beyond_range(info);
                 });
@@ -279,8 +280,8 @@ class Runner {
     ContactMeasurement<S> measurement(scene, knots, script.empty() ? nullptr : &script);
     json about_scene = scene_record(scene, loaded, 1, std::span<const double>(knots), script);
     about_scene["frames"] = knots.size() - 1;
-    about_scene.update(asked_of(study));
-    about_scene["name"] = scene.name + suffix_of(study) + " (contacts)";
+    about_scene.update(asked_of(study.asks));
+    about_scene["name"] = scene.name + suffix_of(study.asks);
     measure_all(study, contestants, loaded, about_scene, scene.name + ", contacts", measurement,
                 [&](const Info& info) -> std::string {
                   if (!info.can.contacts) return "finds no contacts between keyframes";

@@ -14,7 +14,7 @@ std::vector<double> tables_of(const Study& study, const SceneSpec& spec, std::si
   const double triangles = built_in ? double(spec.options.triangles) : usual_triangles;
   const double keyframes = built_in ? double(spec.options.keyframes) : usual_keyframes;
   std::vector<std::uint32_t> per_keyframe = study.per_keyframe;
-  if (study.continuous || has_own_frames(spec)) per_keyframe = {1};
+  if (study.asks.continuous || has_own_frames(spec)) per_keyframe = {1};
   std::vector<double> tables;
   for (std::size_t scalar = 0; scalar < study.scalars.size(); ++scalar)
     for (const std::uint32_t l : per_keyframe) {

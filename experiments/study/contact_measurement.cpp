@@ -1,7 +1,6 @@
 #include "experiments/study/contact_measurement.hpp"
 
 #include <algorithm>
-#include <chrono>
 
 #include "experiments/io/animated_mesh.hpp"
 
@@ -84,52 +83,33 @@ ContactMeasurement<S>::ContactMeasurement(const Scene<S>& scene, std::vector<dou
 
 template <class S>
 void ContactMeasurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle_every) {
-  ContactEntrant<S> entrant;
-  Measured& measured = entrant.measured;
-  measured.spec = &spec;
-  measured.sampled_every = oracle_every;
-  measured.steady_from = steady_from_;
-  entrant.attempt([&] {
-    {
-      Session<S> session(*scene_, spec.contestant());
-      const auto ask = [&](PhaseTimes& times, std::size_t k) {
-        contacts_.clear();
-        measured.verification.candidates += session.contacts(knots_[k + 1], contacts_, times);
-        if (k % oracle_every == 0 || k + 1 == truth_.size()) {
-          std::sort(contacts_.begin(), contacts_.end());
-          compare(contacts_, truth_[k], k, measured.verification);
-        }
-        return std::uint64_t(contacts_.size());
-      };
-      measured.answers = play_intervals<S>(session, knots_, script_, ask).answers;
-      measured.counters = session.strategy().counters();
-      entrant.impacts = session.impact_stats();
-    }
-    if (!measured.verification.holds()) {
-      measured.refused = measured.verification.first_violation;
-      return;
-    }
-    const auto begin = std::chrono::steady_clock::now();
-    entrant.session = std::make_unique<Session<S>>(*scene_, spec.contestant(), Use::timed);
-    measured.build_seconds = seconds_since(begin);
+  this->admit(*scene_, spec, oracle_every, steady_from_, [&](ContactEntrant<S>& entrant) {
+    Measured& measured = entrant.measured;
+    Session<S> session(*scene_, spec.contestant());
+    const auto ask = [&](PhaseTimes& times, std::size_t k) {
+      contacts_.clear();
+      measured.verification.candidates += session.contacts(knots_[k + 1], contacts_, times);
+      if (k % oracle_every == 0 || k + 1 == truth_.size()) {
+        std::sort(contacts_.begin(), contacts_.end());
+        compare(contacts_, truth_[k], k, measured.verification);
+      }
+      return std::uint64_t(contacts_.size());
+    };
+    measured.answers = play_intervals<S>(session, knots_, script_, ask).answers;
+    measured.counters = session.strategy().counters();
+    entrant.impacts = session.impact_stats();
   });
-  this->entrants_.push_back(std::move(entrant));
 }
 
 template <class S>
 void ContactMeasurement<S>::play(std::size_t i) {
-  ContactEntrant<S>& entrant = this->entrants_[i];
-  entrant.attempt([&] {
-    Session<S>& session = *entrant.session;
+  this->play_warm(i, [&](Session<S>& session, const WarmUp* warm_up) {
     const auto ask = [&](PhaseTimes& times, std::size_t k) {
       contacts_.clear();
       session.contacts(knots_[k + 1], contacts_, times);
       return std::uint64_t(contacts_.size());
     };
-    // Buffers grow, and hierarchies for sweeps are created at their first use.
-    const WarmUp warm_up;
-    play_intervals<S>(session, knots_, script_, ask, &warm_up);
-    entrant.keep(play_intervals<S>(session, knots_, script_, ask));
+    return play_intervals<S>(session, knots_, script_, ask, warm_up);
   });
 }
 

@@ -1,7 +1,6 @@
 #include "experiments/study/measure.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <new>
@@ -85,12 +84,8 @@ template std::optional<std::size_t> steady_frame(const Scene<double>&, std::span
 
 template <class S>
 void Measurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle_every) {
-  Entrant<S> entrant;
-  Measured& measured = entrant.measured;
-  measured.spec = &spec;
-  measured.sampled_every = oracle_every;
-  measured.steady_from = steady_from_;
-  entrant.attempt([&] {
+  this->admit(*scene_, spec, oracle_every, steady_from_, [&](Entrant<S>& entrant) {
+    Measured& measured = entrant.measured;
     {
       Session<S> session(*scene_, spec.contestant());
       measured.verification = verify<S>(session, frames_, *oracle_, script_, {oracle_every, quality_samples});
@@ -101,16 +96,8 @@ void Measurement<S>::add(const ContestantSpec& spec, std::uint64_t oracle_every)
                                            {oracle_every, VerifyChangesOptions::Calls::every_frame});
       measured.verification.first_violation = measured.changes.first_violation;
     }
-    if (!measured.verification.holds()) {
-      measured.refused = measured.verification.first_violation;
-    } else {
-      replay(measured);
-      const auto begin = std::chrono::steady_clock::now();
-      entrant.session = std::make_unique<Session<S>>(*scene_, spec.contestant(), Use::timed);
-      measured.build_seconds = seconds_since(begin);
-    }
+    if (measured.verification.holds()) replay(measured);
   });
-  this->entrants_.push_back(std::move(entrant));
 }
 
 template <class S>
@@ -142,13 +129,9 @@ void Measurement<S>::replay(Measured& measured) {
 
 template <class S>
 void Measurement<S>::play(std::size_t i) {
-  Entrant<S>& entrant = this->entrants_[i];
-  entrant.attempt([&] {
-    Session<S>& session = *entrant.session;
+  this->play_warm(i, [&](Session<S>& session, const WarmUp* warm_up) {
     const auto ask = [&](PhaseTimes& times, std::size_t) { return query_.ask(session, times); };
-    const WarmUp warm_up;
-    play_frames<S>(session, frames_, script_, ask, &warm_up);
-    entrant.keep(play_frames<S>(session, frames_, script_, ask));
+    return play_frames<S>(session, frames_, script_, ask, warm_up);
   });
 }
 

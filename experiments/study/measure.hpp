@@ -1,4 +1,5 @@
 #pragma once
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -9,6 +10,7 @@
 
 #include "core/judge/verify.hpp"
 #include "core/judge/verify_changes.hpp"
+#include "experiments/common/stopwatch.hpp"
 #include "experiments/study/clip.hpp"
 #include "experiments/study/contestants.hpp"
 #include "experiments/study/raw_times.hpp"
@@ -91,6 +93,41 @@ class Entrants {
   bool timed(std::size_t i) const { return entrants_[i].session != nullptr; }
 
  protected:
+  /// Adds a contestant. verify(entrant) verifies and replays it; if its guarantee holds afterwards, the
+  /// instance is created that will be timed. Exceptions of the strategy count as a broken guarantee;
+  /// ConfigError is passed on.
+  template <class S, class Verify>
+  void admit(const Scene<S>& scene, const ContestantSpec& spec, std::uint64_t oracle_every,
+             std::optional<std::size_t> steady_from, const Verify& verify) {
+    E entrant;
+    Measured& measured = entrant.measured;
+    measured.spec = &spec;
+    measured.sampled_every = oracle_every;
+    measured.steady_from = steady_from;
+    entrant.attempt([&] {
+      verify(entrant);
+      if (!measured.verification.holds()) {
+        measured.refused = measured.verification.first_violation;
+        return;
+      }
+      const auto begin = std::chrono::steady_clock::now();
+      entrant.session = std::make_unique<Session<S>>(scene, spec.contestant(), Use::timed);
+      measured.build_seconds = seconds_since(begin);
+    });
+    entrants_.push_back(std::move(entrant));
+  }
+  /// Plays a clip, play(session, warm_up), until buffers have grown and hierarchies that are made at their
+  /// first use exist, and once more, whose times are kept.
+  template <class Play>
+  void play_warm(std::size_t i, const Play& play) {
+    E& entrant = entrants_[i];
+    entrant.attempt([&] {
+      const WarmUp warm_up;
+      play(*entrant.session, &warm_up);
+      entrant.keep(play(*entrant.session, nullptr));
+    });
+  }
+
   std::vector<E> entrants_;
 };
 

@@ -75,14 +75,6 @@ StrategyRequest read_strategy(const json& value, const std::string& place) {
   return request;
 }
 
-/// Reads which answer's changes are requested; "none" overrides the level above.
-std::optional<Answer> read_answer(const JsonReader& keys, const std::string& text) {
-  if (text == "none") return {};
-  for (const Answer answer : {Answer::candidates, Answer::pairs})
-    if (text == answer_word(answer)) return answer;
-  keys.fail("changes", "expected candidates, pairs or none, got '" + text + "'");
-}
-
 /// Reads the keys of a study over the current content of `study`.
 void read_study(JsonReader& keys, Study& study, const std::filesystem::path& folder) {
   const std::string& place = keys.place();
@@ -124,51 +116,11 @@ void read_study(JsonReader& keys, Study& study, const std::filesystem::path& fol
   not_negative("interval_width", study.interval_width);
   not_negative("seconds", study.seconds);
   if (const auto limit = keys.whole("frames_limit", ranges::any)) study.frames_limit = *limit;
-  if (const auto continuous = keys.truth("continuous")) study.continuous = *continuous;
-  if (const auto answer = keys.word("changes")) study.changes = read_answer(keys, *answer);
-  if (study.changes && study.continuous) keys.fail("changes", "contacts between keyframes have none");
-  if (const auto rays = keys.word("rays")) {
-    try {
-      study.rays = ray_study(*rays);
-    } catch (const std::invalid_argument& problem) {
-      keys.fail("rays", problem.what());
-    }
-  }
-  if (const auto kernels = keys.word("kernels")) {
-    try {
-      study.kernels = kernel_set(*kernels);
-    } catch (const std::invalid_argument& problem) {
-      keys.fail("kernels", problem.what());
-    }
-  }
-  if (study.rays && (study.continuous || study.changes))
-    keys.fail("rays", "a study asks for one of rays, contacts and changes");
+  read_question(keys, study.asks);
   if (const auto every = keys.whole("oracle_every", ranges::positive)) study.oracle_every = *every;
 }
 
 }  // namespace
-
-const char* answer_word(Answer answer) {
-  return answer == Answer::candidates ? "candidates" : "pairs";
-}
-
-json asked_of(const Study& study) {
-  json asked = json::object();
-  if (study.continuous) asked["continuous"] = true;
-  if (study.changes) asked["changes"] = answer_word(*study.changes);
-  if (study.rays) asked["rays"] = text_of(*study.rays);
-  if (study.kernels) asked["kernels"] = name(*study.kernels);
-  return asked;
-}
-
-std::string suffix_of(const Study& study) {
-  return (study.rays ? suffix_of(*study.rays) : "") +
-         (study.kernels ? " (" + std::string(name(*study.kernels)) + " kernels)" : "");
-}
-
-std::string name_with_changes(const std::string& scene, const std::string& changes) {
-  return changes.empty() ? scene : scene + " (changes of " + changes + ")";
-}
 
 Plan read_plan(const json& value, const std::string& place, const std::filesystem::path& folder) {
   JsonReader keys(value, place);

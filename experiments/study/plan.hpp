@@ -6,11 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "core/contract/queries.hpp"
-#include "core/kernels/kernel_set.hpp"
 #include "experiments/scenes/scene_spec.hpp"
 #include "experiments/study/contestants.hpp"
-#include "experiments/study/ray_measurement.hpp"
+#include "experiments/study/question.hpp"
 #include "experiments/study/targets.hpp"
 
 namespace kbvh::experiments {
@@ -24,29 +22,13 @@ struct Study {
   BuilderRequest builder;                       ///< for all strategies without their own builder
   std::vector<std::uint32_t> per_keyframe{10};  ///< l: frames for each keyframe interval
   std::vector<std::string> scalars{"float"};
-  std::uint32_t repetitions = 5;     ///< at least; fewer than five: exactly this many, and no interval
-  double interval_width = 0.05;      ///< repeat until each ratio's relative interval is narrower
-  double seconds = 10;               ///< rounds beyond the least number end after this time
-  std::uint64_t frames_limit = 0;    ///< only this many first frames; 0: all
-  std::uint64_t oracle_every = 1;    ///< verify every n-th frame (and the last)
-  bool continuous = false;           ///< contacts between keyframes instead of pairs at frames
-  std::optional<Answer> changes;     ///< the changes of this answer instead of pairs at frames
-  std::optional<RayStudy> rays;      ///< rays at frames instead of pairs
-  std::optional<KernelSet> kernels;  ///< holds everything that kbvh computes to this instruction set
+  std::uint32_t repetitions = 5;   ///< at least; fewer than five: exactly this many, and no interval
+  double interval_width = 0.05;    ///< repeat until each ratio's relative interval is narrower
+  double seconds = 10;             ///< rounds beyond the least number end after this time
+  std::uint64_t frames_limit = 0;  ///< only this many first frames; 0: all
+  std::uint64_t oracle_every = 1;  ///< verify every n-th frame (and the last)
+  Question asks;                   ///< of every contestant at every frame
 };
-
-/// Names an answer in plans and results.
-const char* answer_word(Answer answer);
-/// Returns the name of a scene in the tables of a study with `changes`.
-std::string name_with_changes(const std::string& scene, const std::string& changes);
-
-/// Returns the query of a study, as keys of a plan, as far as it differs from pairs at frames with the widest
-/// kernels. In this form it is part of keys, of `again`, and of ids of jobs. A new kind of query is added
-/// here, in `read_plan` and in `suffix_of`.
-nlohmann::json asked_of(const Study& study);
-/// Returns the suffix that tables add to a scene's name for the rays and the kernels of a study: " (coherent
-/// rays)", " (sse kernels)". Changes have `name_with_changes`.
-std::string suffix_of(const Study& study);
 
 /// A plan: one or more studies, run one after the other into the same results.
 struct Plan {

@@ -95,13 +95,13 @@ Target read_target(const json& value, const std::string& place) {
 /// Returns whether the study measures in this scalar and l, and the same kind of answer.
 bool measures(const Study& study, const Target& target) {
   return has(study.scalars, target.scalar) && has(study.per_keyframe, target.per_keyframe) &&
-         target.changes == (study.changes ? answer_word(*study.changes) : "");
+         target.changes == (study.asks.changes ? answer_word(*study.asks.changes) : "");
 }
 
 /// Returns the name of a scene in a study's tables and targets; empty if it has none.
 std::string name_in(const Study& study, const SceneSpec& spec) {
   const std::string name = given_name(spec);
-  return name.empty() ? name : name + suffix_of(study);
+  return name.empty() ? name : name + target_suffix(study.asks);
 }
 
 std::string conditions(const Target& target) {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <map>
 
-#include "core/judge/ray_oracle.hpp"
+#include "core/judge/probe_oracle.hpp"
 #include "core/judge/verify.hpp"
 #include "scenes.hpp"
 #include "tests/support/ray_sets.hpp"
@@ -254,8 +254,10 @@ void range_is_kept() {
     ray.direction[2] = -1;
     ray.length = std::numeric_limits<S>::infinity();
     RayHit hit;
-    EXPECT_THROW(session.hits(RayQuery::closest, std::span<const Ray<S>>(&ray, 1), std::span(&hit, 1), times),
-                 std::invalid_argument);
+    EXPECT_THROW(
+        session.probe(RayProbes<S>{RayQuery::closest, std::span<const Ray<S>>(&ray, 1), std::span(&hit, 1)},
+                      times),
+        std::invalid_argument);
   }
   EXPECT_GT(limited, 0u);
 }
@@ -351,8 +353,8 @@ TEST(Peers, RaysDifferFromTheTruthSeldom) {
         std::vector<Ray<float>> general;  // the first kind: through the scene
         for (std::size_t i = 0; i < rays.size(); i += 8) general.push_back(rays[i]);
         std::vector<RayHit> found(general.size()), any(general.size()), truth(general.size());
-        session.hits(RayQuery::closest, general, std::span<RayHit>(found), ignored);
-        session.hits(RayQuery::any, general, std::span<RayHit>(any), ignored);
+        session.probe(RayProbes<S>{RayQuery::closest, general, std::span<RayHit>(found)}, ignored);
+        session.probe(RayProbes<S>{RayQuery::any, general, std::span<RayHit>(any)}, ignored);
         brute_force_hits<float>(scene, session.playback(), RayQuery::closest, general,
                                 std::span<RayHit>(truth));
         for (std::size_t i = 0; i < general.size(); ++i) {

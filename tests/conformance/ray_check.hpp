@@ -3,7 +3,7 @@
 #include <map>
 
 #include "core/judge/follow_script.hpp"
-#include "core/judge/ray_oracle.hpp"
+#include "core/judge/probe_oracle.hpp"
 #include "tests/conformance/check.hpp"
 #include "tests/support/ray_sets.hpp"
 
@@ -70,7 +70,7 @@ std::string rays_violation(const StrategyEntry& entry, const TestScene<S>& test,
       for (const RayQuery query : {RayQuery::closest, RayQuery::any}) {
         auto& answers = found[query == RayQuery::any ? 1 : 0];
         answers.resize(rays.size());
-        session.hits(query, rays, std::span<RayHit>(answers), ignored);
+        session.probe(RayProbes<S>{query, rays, std::span<RayHit>(answers)}, ignored);
       }
     };
     if (known != truth.end()) ask(known->second.rays);

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "core/contract/registry.hpp"
-#include "core/topology/ray_traversal.hpp"
+#include "core/topology/probe_traversal.hpp"
 #include "tests/conformance/ray_check.hpp"
 
 namespace kbvh::test::ray_faults_test {
@@ -66,12 +66,12 @@ class Simple : public CountedStrategy<S>,
   void follow_plans(double, std::span<const PlanChange<S>>) override {}
   QueryStatus find_candidates(double, PairBuffer&, const Budget&) override { return {}; }
 
-  void find_hits(double, RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits) override {
-    for (std::size_t i = 0; i < rays.size(); ++i) {
-      Ray<S> ray = rays[i];
+  void find_hits(double, const RayProbes<S>& asked) override {
+    for (std::size_t i = 0; i < asked.size(); ++i) {
+      Ray<S> ray = asked.rays[i];
       if (fault == Fault::length_forgotten) ray.length = std::numeric_limits<S>::infinity();
-      hits[i] = {};
-      find_hit(ray, query, hits[i]);
+      asked.hits[i] = {};
+      find_hit(ray, asked.query, asked.hits[i]);
       if (i == 0) first_entered_ = entered_;
     }
   }
@@ -106,8 +106,14 @@ class Simple : public CountedStrategy<S>,
       return;
     }
     // Uses the bodies' boxes from the time when they were made.
-    order_.start(this->scene_, box_of);
-    order_.follow(line_of(ray), limit, enter);
+    order_.start(this->scene_, &RayProbes<S>::meets, box_of);
+    struct Search {
+      RaySlabs boxes;
+      decltype(limit) reach;
+      RaySlabs box_test() const { return boxes; }
+      double limit() const { return reach(); }
+    };
+    order_.follow(Search{RaySlabs(line_of(ray)), limit}, enter);
   }
 
   static RayLine line_of(const Ray<S>& ray) {
@@ -181,7 +187,7 @@ class Simple : public CountedStrategy<S>,
 
   Topologies topologies_;
   std::vector<std::vector<Box<S>>> boxes_;
-  RayBodyOrder order_;
+  BodyOrder order_;
   std::vector<bool> entered_, first_entered_;  ///< [body], by the current ray and by the first one
 };
 

@@ -122,12 +122,14 @@ TEST(RaysOfStrategies, AreCheckedBeforeTheyAreFollowed) {
   session.reset(frame_times(test.scene, 1)[0]);
   const std::vector<Ray<float>> one{{{0, 0, 0}, {1, 0, 0}}};
   std::vector<RayHit> hits(2, RayHit{7, 7, 7});
-  EXPECT_THROW(session.hits(RayQuery::closest, one, std::span<RayHit>(hits), ignored), std::invalid_argument);
+  EXPECT_THROW(session.probe(RayProbes<float>{RayQuery::closest, one, std::span<RayHit>(hits)}, ignored),
+               std::invalid_argument);
   const std::vector<Ray<float>> wrong{{{0, 0, 0}, {1, 0, 0}}, {{0, 0, 0}, {1, 0, 0}, -1}};
-  EXPECT_THROW(session.hits(RayQuery::closest, wrong, std::span<RayHit>(hits), ignored),
+  EXPECT_THROW(session.probe(RayProbes<float>{RayQuery::closest, wrong, std::span<RayHit>(hits)}, ignored),
                std::invalid_argument);
   EXPECT_EQ(hits[0], (RayHit{7, 7, 7}));  // no partial result
-  EXPECT_THROW(session.strategy().hits_at(1e6, RayQuery::closest, one, std::span<RayHit>(hits).first(1)),
+  EXPECT_THROW(session.strategy().probe_at(
+                   1e6, RayProbes<float>{RayQuery::closest, one, std::span<RayHit>(hits).first(1)}),
                std::invalid_argument);
 }
 

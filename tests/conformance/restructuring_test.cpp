@@ -103,7 +103,7 @@ std::uint64_t last_tests_of_rays(const Scene<float>& scene, const std::string& i
   for (int frame = 1; frame <= 30; ++frame) {
     before = session.strategy().counters()[Counter::box_tests];
     session.advance(frame, times);
-    session.hits(RayQuery::closest, rays, hits, times);
+    session.probe(RayProbes<float>{RayQuery::closest, rays, hits}, times);
   }
   return session.strategy().counters()[Counter::box_tests] - before;
 }

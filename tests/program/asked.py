@@ -34,6 +34,8 @@ ASKED: dict[str, dict[str, Any]] = {
     "coherent rays": {"rays": "coherent:64"},
     "incoherent rays": {"rays": "incoherent:64"},
     "whether incoherent rays hit anything": {"rays": "incoherent:64:any"},
+    "primitives near points": {"within": "64:0.01"},
+    "primitives nearer to points": {"within": "64:0.001"},
     "pairs by portable kernels": {"kernels": "portable"},
     "changes by portable kernels": {"changes": "pairs", "kernels": "portable"},
     "rays by portable kernels": {"rays": "coherent:64", "kernels": "portable"},
@@ -51,7 +53,7 @@ ASKED: dict[str, dict[str, Any]] = {
     "other vertex orders": {"scenes": [{**SCENES[0], "order": "shuffled", "seed": 5}, {**SCENES[1], "order": "renumbered"}]},
 }
 #: Options of `kbvh run` that the questions above cover, and others, which choose scenes or do not measure.
-COVERED = {"--continuous", "--changes", "--rays", "--kernels", "--self", "--order", "--seed", "--strategies", "--param", "--builder",
+COVERED = {"--continuous", "--changes", "--rays", "--within", "--kernels", "--self", "--order", "--seed", "--strategies", "--param", "--builder",
            "--width", "--leaf-size", "--l", "--scalar", "--repetitions", "--interval-width", "--seconds", "--frames-limit", "--oracle-every"}  # fmt: skip
 OTHERS = {"--help", "--scene", "--body", "--clip", "--name", "--triangles", "--obstacle", "--keyframes", "--script", "--out", "--plan",
           "--study", "--print-plan", "--names", "--list-jobs", "--prepare", "--job"}  # fmt: skip

@@ -91,12 +91,17 @@ class EveryPair : public Strategy<S> {
 
 /// Answers the other queries, too: no ray hits anything, and every pair may touch.
 template <class S, Fault fault>
-class EveryAnswer : public EveryPair<S, fault>, public AnswersRays<S>, public AnswersSweeps<S> {
+class EveryAnswer : public EveryPair<S, fault>, public AnswersProbes<S>, public AnswersSweeps<S> {
  public:
   using EveryPair<S, fault>::EveryPair;
-  void find_hits(double, RayQuery, std::span<const Ray<S>>, std::span<RayHit> hits) override {
-    std::fill(hits.begin(), hits.end(), RayHit{});
-    if (fault == Fault::lazy_when_timed && this->is_timed()) hits[0] = {0, 0, 1};
+  void answer_probes(double, const Probes<S>& probes) override {
+    const bool wrong = fault == Fault::lazy_when_timed && this->is_timed();
+    if (const auto* rays = std::get_if<RayProbes<S>>(&probes)) {
+      std::fill(rays->hits.begin(), rays->hits.end(), RayHit{});
+      if (wrong) rays->hits[0] = {0, 0, 1};
+    } else if (wrong) {
+      std::get<BallProbes<S>>(probes).found->push_back({0, 0, 0});
+    }
   }
   void find_swept_pairs(double, double, std::span<const S* const>, PairBuffer& out) override {
     if (fault == Fault::lazy_when_timed && this->is_timed()) return;

@@ -32,11 +32,11 @@ void add_keys(const Study& study, const LoadedScene& loaded, const json& machine
   std::vector<std::string> notes;
   const auto contestants = expand(study.strategies, study.params, study.builder, notes);
   std::vector<std::uint32_t> per_keyframe = study.per_keyframe;
-  if (has_own_frames(loaded) || study.continuous) per_keyframe = {1};
+  if (has_own_frames(loaded) || study.asks.continuous) per_keyframe = {1};
   for (const std::uint32_t l : per_keyframe) {
     const std::size_t most = study.frames_limit > 0 ? study.frames_limit : SIZE_MAX;
     std::vector<double> frames =
-        study.continuous ? overlaid_keyframes(scene) : frames_of(scene, loaded, script, l, most);
+        study.asks.continuous ? overlaid_keyframes(scene) : frames_of(scene, loaded, script, l, most);
     frames.resize(std::min(frames.size(), most));
     const json about = scene_record(scene, loaded, l, std::span<const double>(frames), script);
     for (const ContestantSpec& spec : contestants)
@@ -250,8 +250,8 @@ TEST(Keys, SeeTheMachineAndTheProgram) {
   const auto add = [&](const std::string& program, const json& about, const json& who, const json& machine,
                        bool continuous = false, std::optional<Answer> changes = {}) {
     Study study;
-    study.continuous = continuous;
-    study.changes = changes;
+    study.asks.continuous = continuous;
+    study.asks.changes = changes;
     keys.insert(configuration_key(program, about, who, study, machine));
     ++altered;
   };

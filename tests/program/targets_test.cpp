@@ -107,10 +107,10 @@ std::vector<std::string> missing_baselines(const Plan& plan) {
     };
     for (const Study& study : plan.studies) {
       const auto named = [&](const SceneSpec& spec) {
-        return has(target.scenes, given_name(spec) + suffix_of(study));
+        return has(target.scenes, given_name(spec) + target_suffix(study.asks));
       };
       if (!has(study.scalars, target.scalar) || !has(study.per_keyframe, target.per_keyframe) ||
-          target.changes != (study.changes ? answer_word(*study.changes) : "") ||
+          target.changes != (study.asks.changes ? answer_word(*study.asks.changes) : "") ||
           std::none_of(study.scenes.begin(), study.scenes.end(), named))
         continue;
       std::set<std::string> ids;

@@ -167,7 +167,7 @@ std::string allocations_of_rays(const StrategyEntry& entry, const TestScene<S>& 
       t == test.frames[0] ? session.reset(t) : session.advance(t, times);
       const std::uint64_t before = allocations;
       for (const RayQuery query : {RayQuery::closest, RayQuery::any})
-        session.hits(query, rays, std::span<RayHit>(hits), times);
+        session.probe(RayProbes<S>{query, rays, std::span<RayHit>(hits)}, times);
       if (round == 2 && t != test.frames[0] && allocations != before)
         return "t = " + std::to_string(t) + ": " + std::to_string(allocations - before) + " allocations";
     }

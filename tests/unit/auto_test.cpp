@@ -136,7 +136,7 @@ TEST(Auto, RebuildsTreesThatAgeByRaysAlone) {
   play.session.reset(0);
   for (int f = 0; f < 100; ++f) {
     if (f > 0) play.session.advance(f, play.times);
-    play.session.hits(RayQuery::closest, rays, hits, play.times);
+    play.session.probe(RayProbes<float>{RayQuery::closest, rays, hits}, play.times);
   }
   const std::string choice = play.session.strategy().choice();
   EXPECT_GT(frames_in_new_trees(choice), 60) << choice;

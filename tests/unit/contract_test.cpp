@@ -60,7 +60,7 @@ class Able : public Careless<S>,
              public AnswersSelfPairs,
              public AnswersSpans<S>,
              public AnswersSweeps<S>,
-             public AnswersRays<S>,
+             public AnswersProbes<S>,
              public TakesPlanChanges<S>,
              public TakesGeometryChanges<S> {
  public:
@@ -73,8 +73,8 @@ class Able : public Careless<S>,
   void find_swept_pairs(double, double, std::span<const S* const>, PairBuffer&) override {
     calls.push_back("sweep");
   }
-  void find_hits(double, RayQuery, std::span<const Ray<S>>, std::span<RayHit>) override {
-    calls.push_back("rays");
+  void answer_probes(double, const Probes<S>& probes) override {
+    calls.push_back(std::holds_alternative<RayProbes<S>>(probes) ? "rays" : "balls");
   }
   void follow_plans(double, std::span<const PlanChange<S>>) override { calls.push_back("plans"); }
   void follow_geometry(double, const GeometryChange<S>&) override { calls.push_back("geometry"); }
@@ -150,7 +150,7 @@ TEST(Contract, WhatAClassCannotDoThrows) {
   EXPECT_THROW(made.strategy.spans(0, 1, spans), std::logic_error);
   EXPECT_THROW(made.strategy.start_sweep(0), std::logic_error);
   EXPECT_THROW(made.strategy.swept_pairs(0, 1, {}, made.pairs), std::logic_error);
-  EXPECT_THROW(made.strategy.hits_at(0, RayQuery::any, {}, {}), std::logic_error);
+  EXPECT_THROW(made.strategy.probe_at(0, RayProbes<float>{RayQuery::any, {}, {}}), std::logic_error);
   EXPECT_THROW(made.strategy.flight_plans_changed(0, {}), std::logic_error);
   EXPECT_THROW(made.strategy.geometry_changed(0, {}), std::logic_error);
   EXPECT_THROW(made.strategy.step_event(1, event), std::logic_error);
@@ -178,7 +178,17 @@ TEST(Contract, NoFlagLies) {
     EXPECT_EQ(refused([&] { strategy.flight_plans_changed(0, {}); }), !can.plan_changes) << entry.info.id;
     EXPECT_EQ(refused([&] { strategy.geometry_changed(0, {}); }), !can.geometry_changes) << entry.info.id;
     EXPECT_EQ(refused([&] { strategy.start_sweep(0); }), !can.contacts) << entry.info.id;
-    EXPECT_EQ(refused([&] { strategy.hits_at(0, RayQuery::any, {}, {}); }), !can.rays) << entry.info.id;
+    EXPECT_EQ(refused([&] {
+                strategy.probe_at(0, RayProbes<float>{RayQuery::any, {}, {}});
+              }),
+              !can.rays)
+        << entry.info.id;
+    BallHits met;
+    EXPECT_EQ(refused([&] {
+                strategy.probe_at(0, BallProbes<float>{{}, &met});
+              }),
+              !can.probes)
+        << entry.info.id;
     EventDescription<float> event;
     EXPECT_EQ(refused([&] { strategy.step_event(0, event); }), !can.events) << entry.info.id;
     EXPECT_EQ(strategy.events() != nullptr, can.events) << entry.info.id;
@@ -218,9 +228,9 @@ TEST(Contract, TheBaseClassChecksTimes) {
   EXPECT_THROW(strategy.start_sweep(3), std::invalid_argument);
   EXPECT_THROW(strategy.flight_plans_changed(1, {}), std::invalid_argument);
   EXPECT_THROW(strategy.geometry_changed(1, {}), std::invalid_argument);
-  EXPECT_THROW(strategy.hits_at(1, RayQuery::any, {}, {}), std::invalid_argument);
+  EXPECT_THROW(strategy.probe_at(1, RayProbes<float>{RayQuery::any, {}, {}}), std::invalid_argument);
   RayHit hit;
-  EXPECT_THROW(strategy.hits_at(2, RayQuery::any, {}, {&hit, 1}), std::invalid_argument);
+  EXPECT_THROW(strategy.probe_at(2, RayProbes<float>{RayQuery::any, {}, {&hit, 1}}), std::invalid_argument);
   const float* const none[] = {nullptr};
   EXPECT_THROW(strategy.swept_pairs(2, 3, none, made.pairs), std::invalid_argument);  // two bodies
   EXPECT_TRUE(strategy.calls.empty());
@@ -231,7 +241,7 @@ TEST(Contract, TheBaseClassChecksTimes) {
   const float* const both[] = {nullptr, nullptr};
   strategy.swept_pairs(3, 4, both, made.pairs);
   strategy.flight_plans_changed(4, {});
-  strategy.hits_at(4, RayQuery::any, {}, {});
+  strategy.probe_at(4, RayProbes<float>{RayQuery::any, {}, {}});
   EXPECT_EQ(strategy.calls, (std::vector<std::string>{"changes", "spans", "sweep", "plans", "rays"}));
   EXPECT_EQ(strategy.now(), 4);
   EXPECT_EQ(strategy.before(), 3);

@@ -5,9 +5,9 @@
 
 #include <random>
 
-#include "core/families/drift/drift_rays.hpp"
+#include "core/families/drift/drift_probes.hpp"
 #include "core/families/drift/near_pairs.hpp"
-#include "core/judge/ray_oracle.hpp"
+#include "core/judge/probe_oracle.hpp"
 #include "core/judge/verify.hpp"
 #include "core/kernels/kernel_set.hpp"
 #include "tests/support/moving_grids.hpp"
@@ -135,7 +135,7 @@ int check_rays(const Scene<float>& scene, const char* id) {
         std::exchange(visited, session.strategy().counters()[Counter::nodes_visited]);
     kept += visited == before ? 1 : 0;
     if (f % 4 != 0) session.strategy().pairs_at(t, pairs);
-    session.hits(RayQuery::closest, rays, std::span<RayHit>(hits), ignored);
+    session.probe(RayProbes<float>{RayQuery::closest, rays, std::span<RayHit>(hits)}, ignored);
     session.playback().evaluate_all();
     const RayCheck check = check_hits<float>(session.scene(), session.playback(), RayQuery::closest,
                                              std::span<const Ray<float>>(rays), hits);
@@ -168,7 +168,7 @@ void check_old_boxes(const char* name, std::uint64_t& found) {
     bodies[body].watch = DriftBody<S>::Watch::drift;
     bodies[body].stand();
   }
-  DriftRays<S> drift(view, SampledMotion<S>(playback));
+  DriftProbes<S> drift(view, SampledMotion<S>(playback));
   const std::size_t stride = 1 + frames.size() / 6;
   for (std::size_t f = 1; f < frames.size(); f += stride) {
     playback.seek(frames[f]);
@@ -185,8 +185,7 @@ void check_old_boxes(const char* name, std::uint64_t& found) {
     std::vector<RayHit> hits(rays.size());
     TriangleTestStats stats;
     std::uint64_t tests = 0;
-    drift.find(trees, bodies, true, RayQuery::closest, std::span<const Ray<S>>(rays), std::span<RayHit>(hits),
-               stats, tests, nullptr);
+    drift.answer(trees, bodies, true, RayProbes<S>{RayQuery::closest, rays, hits}, stats, tests, nullptr);
     const RayCheck check =
         check_hits<S>(test.scene, playback, RayQuery::closest, std::span<const Ray<S>>(rays), hits);
     EXPECT_TRUE(check.holds()) << name << ", frame " << f << ": " << check.first_violation;
@@ -194,7 +193,7 @@ void check_old_boxes(const char* name, std::uint64_t& found) {
   }
 }
 
-TEST(DriftRays, ReadOldBoxesAsFarAsVerticesMoved) {
+TEST(DriftProbes, ReadOldBoxesAsFarAsVerticesMoved) {
   std::uint64_t found = 0;
   for (const char* name : {"soups", "sheets"}) {
     check_old_boxes<float>(name, found);

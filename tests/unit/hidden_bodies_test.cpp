@@ -4,10 +4,10 @@
 
 #include <vector>
 
-#include "core/families/wide/wide_rays.hpp"
-#include "core/judge/ray_oracle.hpp"
+#include "core/families/wide/wide_probes.hpp"
+#include "core/judge/probe_oracle.hpp"
 #include "core/topology/builders.hpp"
-#include "core/topology/ray_traversal.hpp"
+#include "core/topology/probe_traversal.hpp"
 
 namespace kbvh::hidden_bodies_test {
 namespace {
@@ -59,14 +59,14 @@ Asked ask_wide(const Scene<S>& scene, RayQuery query, const std::vector<Ray<S>>&
     roots.push_back(boxes[0]);
     roots.back().extend(boxes[1]);
   }
-  WideRays<S> wide(view, SampledMotion<S>(playback));
+  WideProbes<S> wide(view, SampledMotion<S>(playback));
   TriangleTestStats stats;
   std::uint64_t tests = 0;
   hits.assign(rays.size(), {});
-  wide.find(
-      query, std::span<const Ray<S>>(rays), std::span<RayHit>(hits),
+  wide.answer(
+      RayProbes<S>{query, rays, hits},
       [&](std::uint32_t body) {
-        WideRaySide<S> side(&trees[body], stale[body].data());
+        WideProbeSide<S> side(&trees[body], stale[body].data());
         side.root = roots[body];
         return side;
       },
@@ -99,21 +99,20 @@ void check_stacked_squares() {
 
     // The same without wide hierarchies.
     const SceneView<S> view(scene);
-    RayBodyOrder order;
+    BodyOrder order;
     RayBodies counts;
     std::vector<int> followed(scene.bodies.size());
     std::vector<RayHit> found(rays.size());
     TriangleTestStats stats;
-    find_hits_by_body(
-        view, SampledMotion<S>(playback), query, std::span<const Ray<S>>(rays), std::span<RayHit>(found),
-        order, &counts,
+    answer_by_body(
+        view, SampledMotion<S>(playback), Probes<S>(RayProbes<S>{query, rays, found}), order, &counts,
         [&](std::uint32_t body) {
           const auto boxes = primitive_boxes(view.primitives(body), playback.positions(body));
           Box<S> box = boxes[0];
           box.extend(boxes[1]);
           return box;
         },
-        [&](std::uint32_t body, RaySearch<S>& search, std::uint64_t&) {
+        [&](std::uint32_t body, auto& search, std::uint64_t&) {
           ++followed[body];
           const Primitives& primitives = view.primitives(body);
           for (std::uint32_t p = 0; p < primitives.count(); ++p)

@@ -12,7 +12,7 @@
 #include "core/geometry/polygon_cut.hpp"
 #include "core/judge/oracle.hpp"
 #include "core/judge/polygon_region.hpp"
-#include "core/judge/ray_oracle.hpp"
+#include "core/judge/probe_oracle.hpp"
 #include "core/scene/cut_polygons.hpp"
 #include "core/scene/geometry_change.hpp"
 #include "core/topology/renumber.hpp"

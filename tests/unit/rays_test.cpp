@@ -12,9 +12,9 @@
 #include <optional>
 #include <random>
 
-#include "core/families/wide/wide_rays.hpp"
+#include "core/families/wide/wide_probes.hpp"
 #include "core/geometry/ray_box.hpp"
-#include "core/judge/ray_oracle.hpp"
+#include "core/judge/probe_oracle.hpp"
 #include "core/topology/builders.hpp"
 #include "tests/support/polygon_soups.hpp"
 #include "tests/support/rational_geometry.hpp"
@@ -418,11 +418,11 @@ std::vector<RayHit> wide_hits(const Scene<S>& scene, Playback<S>& playback, cons
     hierarchies[body].assign(build_topology<S>(boxes, builder), view.primitives(body), set);
     hierarchies[body].refit(playback.positions(body));
   }
-  WideRays<S> wide(view, SampledMotion<S>(playback));
+  WideProbes<S> wide(view, SampledMotion<S>(playback));
   std::vector<RayHit> hits(rays.size());
   TriangleTestStats stats;
-  wide.find(
-      query, rays, std::span<RayHit>(hits),
+  wide.answer(
+      RayProbes<S>{query, rays, hits},
       [&](std::uint32_t body) -> WideSide<S> {
         return {&hierarchies[body], body};
       },
@@ -461,10 +461,10 @@ void check_wide_rays() {
   EXPECT_GT(hit, 5000U);
 }
 
-TEST(WideRays, EveryKernelAnswersLikeAllPrimitivesInFloat) {
+TEST(WideProbes, EveryKernelAnswersLikeAllPrimitivesInFloat) {
   check_wide_rays<float>();
 }
-TEST(WideRays, EveryKernelAnswersLikeAllPrimitivesInDouble) {
+TEST(WideProbes, EveryKernelAnswersLikeAllPrimitivesInDouble) {
   check_wide_rays<double>();
 }
 
@@ -507,10 +507,10 @@ void screen_keeps_rays_that_meet() {
     EXPECT_GT(rejected, 10000u) << name(set);
   }
 }
-TEST(WideRays, BlocksKeepRaysThatMeetABoxInFloat) {
+TEST(WideProbes, BlocksKeepRaysThatMeetABoxInFloat) {
   screen_keeps_rays_that_meet<float>();
 }
-TEST(WideRays, BlocksKeepRaysThatMeetABoxInDouble) {
+TEST(WideProbes, BlocksKeepRaysThatMeetABoxInDouble) {
   screen_keeps_rays_that_meet<double>();
 }
 

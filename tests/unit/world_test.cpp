@@ -180,7 +180,7 @@ void expect_the_same_hits(const char* id) {
     for (const WorldRayQuery query : {WorldRayQuery::closest, WorldRayQuery::any}) {
       std::vector<RayHit> expected(rays.size());
       std::vector<WorldHit> found(1000);  // old content, to be replaced
-      session.hits(RayQuery(query), rays, std::span<RayHit>(expected), times);
+      session.probe(RayProbes<S>{RayQuery(query), rays, std::span<RayHit>(expected)}, times);
       world.hits(query, plain, found);
       ASSERT_EQ(found.size(), expected.size());
       for (std::size_t i = 0; i < found.size(); ++i) {

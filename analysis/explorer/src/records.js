@@ -8,7 +8,7 @@ const OF_GROUP = ["cpu", "os", "compiler", "flags", "build_type", "simd", "kerne
 const COUNTERS = ["certificates_failed", "values_written", "nodes_visited", "box_tests", "triangle_tests"];
 const VERIFIED = ["pairs", "candidates", "missed_candidates", "missed", "extra"];
 /** The ending of a scene's name that says that something other than pairs at frames was asked: ANSWER of scene_names.py. */
-const ANSWER = /( \((contacts|changes of (candidates|pairs)|(in)?coherent rays(, any)?|\w+ kernels)\))*$/;
+const ANSWER = /( \((contacts|changes of (candidates|pairs)|(in)?coherent rays(, any)?|within [\d.e-]+|\w+ kernels)\))*$/;
 
 const number = (value, digits) => {
   if (typeof value !== "number" || !Number.isFinite(value)) return null;
@@ -171,6 +171,7 @@ function newest(rows) {
 
 function asks({ scene, bodies }) {
   if (scene.rays) return "rays";
+  if (scene.within) return "primitives near points";
   if (scene.continuous) return "contacts between keyframes";
   if (scene.changes) return `changes of ${scene.changes}`;
   if (scene.script?.changes) return "pairs while plans change";
@@ -254,7 +255,7 @@ function contestantOf(row, look) {
 
 function cellOf(row, machinesOf, commitsOf) {
   const { scene } = row;
-  const asked = { continuous: scene.continuous ?? false, changes: scene.changes ?? "", rays: scene.rays ?? "", kernels: scene.kernels ?? "" };
+  const asked = { continuous: scene.continuous ?? false, changes: scene.changes ?? "", rays: scene.rays ?? "", within: scene.within ?? "", kernels: scene.kernels ?? "" };
   return {
     scene: row.sceneName,
     name: scene.name,

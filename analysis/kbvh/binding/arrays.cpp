@@ -232,6 +232,13 @@ const py::dtype& hit_type() {
                                                  sizeof(WorldHit)));
   return type;
 }
+const py::dtype& ball_hit_type() {
+  static const py::dtype& type = kept(structured({{"point", u4(), offsetof(WorldBallHit, ball)},
+                                                  {"body", u4(), offsetof(WorldBallHit, body)},
+                                                  {"primitive", u4(), offsetof(WorldBallHit, primitive)}},
+                                                 sizeof(WorldBallHit)));
+  return type;
+}
 const py::dtype& node_type() {
   static const py::dtype& type = kept(structured({{"parent", u4(), offsetof(WorldNode, parent)},
                                                   {"first", u4(), offsetof(WorldNode, first)},

@@ -99,6 +99,7 @@ const py::dtype& pair_type();
 const py::dtype& span_type();
 const py::dtype& contact_type();
 const py::dtype& hit_type();
+const py::dtype& ball_hit_type();
 const py::dtype& node_type();
 const py::dtype& watch_type();
 const py::dtype& event_type();

@@ -113,6 +113,20 @@ class PythonWorld {
     alone([&] { world_.hits(any ? WorldRayQuery::any : WorldRayQuery::closest, asked, out); });
     return records_of(std::move(out), hit_type());
   }
+  /// `balls` is [ball][4]: centre, radius.
+  py::array within(const py::object& balls) {
+    const std::vector<double> numbers = doubles_of(balls, "balls");
+    if (numbers.size() % 4 != 0)
+      throw std::invalid_argument(std::to_string(numbers.size()) + " numbers are no balls of 4 each");
+    std::vector<WorldBall> asked(numbers.size() / 4);
+    for (std::size_t i = 0; i < asked.size(); ++i) {
+      std::copy_n(&numbers[4 * i], 3, asked[i].centre);
+      asked[i].radius = numbers[4 * i + 3];
+    }
+    std::vector<WorldBallHit> out;
+    alone([&] { world_.within(asked, out); });
+    return records_of(std::move(out), ball_hit_type());
+  }
   double next_knot() const { return world_.next_knot(); }
 
   /// Returns whether the array is used where it lies: one of 3n + 1 numbers in the world's precision.
@@ -407,6 +421,7 @@ void bind_world(py::module_& module) {
       .def("spans", method(&PythonWorld::spans), arg("t"))
       .def("contacts", method(&PythonWorld::contacts), arg("t"))
       .def("hits", method(&PythonWorld::hits), arg("rays"), arg("any"))
+      .def("within", method(&PythonWorld::within), arg("balls"))
       .def("positions", method(&PythonWorld::positions), arg("body"))
       .def("positions_address", method(&PythonWorld::positions_address), arg("body"))
       .def("hierarchy", method(&PythonWorld::hierarchy), arg("body"))

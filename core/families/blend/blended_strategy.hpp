@@ -8,8 +8,8 @@
 #include "core/families/wide/lazy_query.hpp"
 #include "core/families/wide/near_bodies.hpp"
 #include "core/families/wide/rows_on_demand.hpp"
+#include "core/families/wide/wide_probes.hpp"
 #include "core/families/wide/wide_query.hpp"
-#include "core/families/wide/wide_rays.hpp"
 
 namespace kbvh {
 
@@ -46,7 +46,7 @@ class BlendedRows : public RowsOnDemand<S> {
 /// tight boxes. Bodies whose vertices get their own plans are refitted at every frame from then on, because
 /// their motion is no longer that of the clip.
 template <class S>
-class BlendedStrategy : public CountedStrategy<S>, public AnswersRays<S>, public TakesPlanChanges<S> {
+class BlendedStrategy : public CountedStrategy<S>, public AnswersProbes<S>, public TakesPlanChanges<S> {
  public:
   static constexpr Foresight foresight = Foresight::whole_clip;
 
@@ -63,7 +63,7 @@ class BlendedStrategy : public CountedStrategy<S>, public AnswersRays<S>, public
 
   void reset_to(double t) override {
     near_bodies_.start_over();
-    rays_.start_over();
+    probes_.start_over();
     for (std::uint32_t index = 0; index < bodies_.size(); ++index) {
       Body& body = bodies_[index];
       body.rows.start_over();
@@ -127,7 +127,7 @@ class BlendedStrategy : public CountedStrategy<S>, public AnswersRays<S>, public
   }
 
   std::size_t bytes() const override {
-    std::size_t total = near_bodies_.bytes() + query_.bytes() + rays_.bytes();
+    std::size_t total = near_bodies_.bytes() + query_.bytes() + probes_.bytes();
     for (const Body& body : bodies_)
       total += body.rows.bytes() + body.terms.terms.capacity() * sizeof(BlendTerm<S>) +
                (body.source ? body.source->bytes() : 0);
@@ -154,12 +154,11 @@ class BlendedStrategy : public CountedStrategy<S>, public AnswersRays<S>, public
   const WideHierarchy<S>& hierarchy(std::uint32_t index) const { return bodies_[index].rows.hierarchy(); }
   WideHierarchy<S>& hierarchy(std::uint32_t index) { return bodies_[index].rows.hierarchy(); }
 
-  void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
-                 std::span<RayHit> hits) override {
+  void answer_probes(double /*t*/, const Probes<S>& probes) override {
     std::uint64_t tests = 0;
     make_visited();
-    rays_.find(
-        query, rays, hits, [&](std::uint32_t index) { return lazy_side(index); },
+    probes_.answer(
+        probes, [&](std::uint32_t index) { return lazy_side(index); },
         [&](std::uint32_t index, std::uint32_t node) { make_wanted(index, node); }, this->triangle_stats_,
         tests, this->ray_bodies());
     this->count_.add(Counter::box_tests, tests);
@@ -204,7 +203,7 @@ class BlendedStrategy : public CountedStrategy<S>, public AnswersRays<S>, public
   }
 
   WideQuery<S> query_{this->scene_, this->sampled_};
-  WideRays<S> rays_{this->scene_, this->sampled_};
+  WideProbes<S> probes_{this->scene_, this->sampled_};
 };
 
 }  // namespace kbvh

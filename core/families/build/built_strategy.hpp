@@ -5,8 +5,8 @@
 #include "core/families/build/built_each_frame.hpp"
 #include "core/families/build/built_tree.hpp"
 #include "core/families/build/curve_order.hpp"
+#include "core/families/wide/wide_probes.hpp"
 #include "core/families/wide/wide_query.hpp"
-#include "core/families/wide/wide_rays.hpp"
 
 namespace kbvh {
 
@@ -17,7 +17,7 @@ namespace kbvh {
 /// and may have searched(): the clusters searched by all builds, which are then counted. Of the given
 /// topologies, only the leaf size counts.
 template <class S, class Builder>
-class BuiltStrategy : public BuiltEachFrame<S, BuiltTree<S>>, public AnswersRays<S>, public ReportsWork {
+class BuiltStrategy : public BuiltEachFrame<S, BuiltTree<S>>, public AnswersProbes<S>, public ReportsWork {
   using Base = BuiltEachFrame<S, BuiltTree<S>>;
 
  protected:
@@ -35,7 +35,7 @@ class BuiltStrategy : public BuiltEachFrame<S, BuiltTree<S>>, public AnswersRays
 
   void reset_to(double t) override {
     Base::reset_to(t);
-    rays_.start_over();
+    probes_.start_over();
     check_layouts(
         this->scene_.pairs(), [&](std::uint32_t body) -> const auto& { return bodies_[body]; });
   }
@@ -69,7 +69,7 @@ class BuiltStrategy : public BuiltEachFrame<S, BuiltTree<S>>, public AnswersRays
     return view;
   }
   std::size_t bytes() const override {
-    return Base::bytes() + builder_.bytes() + order_.bytes() + query_.bytes() + rays_.bytes();
+    return Base::bytes() + builder_.bytes() + order_.bytes() + query_.bytes() + probes_.bytes();
   }
 
  protected:
@@ -78,14 +78,13 @@ class BuiltStrategy : public BuiltEachFrame<S, BuiltTree<S>>, public AnswersRays
     builder_.build(bodies_[body], order_, lists_[body]);
     count_boxes(body);
   }
-  void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
-                 std::span<RayHit> hits) override {
+  void answer_probes(double /*t*/, const Probes<S>& probes) override {
     std::uint64_t tests = 0;
     const auto side_of = [&](std::uint32_t body) -> WideSide<S> { return {&bodies_[body], body}; };
-    rays_.find(query, rays, hits, side_of, this->triangle_stats_, tests, this->ray_bodies());
+    probes_.answer(probes, side_of, this->triangle_stats_, tests, this->ray_bodies());
     this->count_.add(Counter::box_tests, tests);
     last_ray_tests_ = tests;
-    for (std::uint32_t body = 0; body < bodies_.size(); ++body) followed(body, rays_.work()[body]);
+    for (std::uint32_t body = 0; body < bodies_.size(); ++body) followed(body, probes_.work()[body]);
   }
   void counts_cleared() override {
     if constexpr (searches) searched_before_ = builder_.searched();
@@ -119,7 +118,7 @@ class BuiltStrategy : public BuiltEachFrame<S, BuiltTree<S>>, public AnswersRays
   Builder builder_;
   CurveOrder<S> order_;
   WideQuery<S> query_{this->scene_, this->sampled_};
-  WideRays<S> rays_{this->scene_, this->sampled_};
+  WideProbes<S> probes_{this->scene_, this->sampled_};
   std::uint64_t last_box_tests_ = 0, last_ray_tests_ = 0, searched_before_ = 0;
 };
 

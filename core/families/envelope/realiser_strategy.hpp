@@ -7,15 +7,15 @@
 #include "core/families/wide/lazy_query.hpp"
 #include "core/families/wide/near_bodies.hpp"
 #include "core/families/wide/realiser_rows.hpp"
+#include "core/families/wide/wide_probes.hpp"
 #include "core/families/wide/wide_query.hpp"
-#include "core/families/wide/wide_rays.hpp"
 
 namespace kbvh {
 
 /// The shared part of strategies that keep the realisers of a wide hierarchy's boxes instead of the boxes
 /// (RealiserRows). Queries run on the kernels of a refit's query.
 template <class S>
-class RealiserStrategy : public CountedStrategy<S>, public AnswersRays<S> {
+class RealiserStrategy : public CountedStrategy<S>, public AnswersProbes<S> {
  public:
   RealiserStrategy(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies)
       : CountedStrategy<S>(scene, motion), motion_(motion), near_bodies_(scene.pairs(), scene.body_count()) {
@@ -61,7 +61,7 @@ class RealiserStrategy : public CountedStrategy<S>, public AnswersRays<S> {
   }
 
   std::size_t bytes() const override {
-    std::size_t total = near_bodies_.bytes() + query_.bytes() + rays_.bytes();
+    std::size_t total = near_bodies_.bytes() + query_.bytes() + probes_.bytes();
     for (const Body& body : bodies_)
       total += body.rows.bytes() + body.realisers.size() * sizeof(std::uint32_t);
     return total;
@@ -90,12 +90,11 @@ class RealiserStrategy : public CountedStrategy<S>, public AnswersRays<S> {
   NearBodies near_bodies_;
   std::vector<Body> bodies_;
 
-  void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
-                 std::span<RayHit> hits) override {
+  void answer_probes(double /*t*/, const Probes<S>& probes) override {
     std::uint64_t tests = 0;
     std::uint64_t reads = make_visited();
-    rays_.find(
-        query, rays, hits, [&](std::uint32_t body) { return lazy_side(body); },
+    probes_.answer(
+        probes, [&](std::uint32_t body) { return lazy_side(body); },
         [&](std::uint32_t index, std::uint32_t node) {
           Body& body = bodies_[index];
           reads += body.rows.make_wanted(node, this->sampled_, index, places_of(body));
@@ -140,7 +139,7 @@ class RealiserStrategy : public CountedStrategy<S>, public AnswersRays<S> {
   }
 
   WideQuery<S> query_{this->scene_, this->sampled_};
-  WideRays<S> rays_{this->scene_, this->sampled_};
+  WideProbes<S> probes_{this->scene_, this->sampled_};
 };
 
 }  // namespace kbvh

@@ -14,7 +14,7 @@
 #include "core/families/wide/near_bodies.hpp"
 #include "core/geometry/volumes/aligned_box.hpp"
 #include "core/topology/leaf_pairs.hpp"
-#include "core/topology/ray_traversal.hpp"
+#include "core/topology/probe_traversal.hpp"
 
 namespace kbvh {
 
@@ -28,7 +28,7 @@ enum class KineticQuery : std::uint8_t {
 /// selectable kinds of KineticForest, of boxes or of k-DOPs. The clock of a forest's queue decides about
 /// events; k-DOPs need an EventClock. Queries of k-DOPs go node by node.
 template <class S, class... Forests>
-class KineticTreeStrategy : public CountedStrategy<S>, public AnswersRays<S> {
+class KineticTreeStrategy : public CountedStrategy<S>, public AnswersProbes<S> {
   /// A forest, and the volumes of its trees at the current frame.
   template <class ForestType>
   struct Kind {
@@ -169,14 +169,13 @@ class KineticTreeStrategy : public CountedStrategy<S>, public AnswersRays<S> {
       std::size_t total = kind.forest.bytes();
       for (const auto& volumes : kind.volumes) total += volumes.bytes();
       return total + near_bodies_.bytes() + rows_.bytes() + stack_.capacity() * sizeof(NodePair) +
-             ray_order_.bytes() + ray_stack_.capacity() * sizeof(RayNode<std::uint32_t>);
+             probe_order_.bytes() + probe_stack_.capacity() * sizeof(ProbeNode<std::uint32_t>);
     });
   }
 
  protected:
   /// Follows rays node by node, in the boxes around volumes.
-  void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
-                 std::span<RayHit> hits) override {
+  void answer_probes(double /*t*/, const Probes<S>& probes) override {
     on_kind([&](auto& kind) {
       if constexpr (of_boxes<decltype(kind)>)
         for (std::uint32_t body = 0; by_rows_ && body < kind.volumes.size(); ++body)
@@ -187,17 +186,17 @@ class KineticTreeStrategy : public CountedStrategy<S>, public AnswersRays<S> {
         volumes.ensure(0);
         return to_double(enclosing_box(volumes(0)));
       };
-      const std::uint64_t all = find_hits_by_body(
-          this->scene_, this->sampled_, query, rays, hits, ray_order_, this->ray_bodies(), box_of,
-          [&](std::uint32_t body, RaySearch<S>& search, std::uint64_t& tests) {
+      const std::uint64_t all = answer_by_body(
+          this->scene_, this->sampled_, probes, probe_order_, this->ray_bodies(), box_of,
+          [&](std::uint32_t body, auto& search, std::uint64_t& tests) {
             const Topology& topology = kind.forest.tree(body).topology();
             auto&& volumes = view(kind, body);
             const TopologyTree tree{topology, [&](std::uint32_t node) {
                                       volumes.ensure(node);
                                       return enclosing_box(volumes(node));
                                     }};
-            return follow_ray(tree, search, body, this->scene_.primitives(body),
-                              this->sampled_.positions(body), ray_stack_, tests, this->triangle_stats_);
+            return follow_probe(tree, search, body, this->scene_.primitives(body),
+                                this->sampled_.positions(body), probe_stack_, tests, this->triangle_stats_);
           });
       this->count_.add(Counter::box_tests, all);
     });
@@ -283,8 +282,8 @@ class KineticTreeStrategy : public CountedStrategy<S>, public AnswersRays<S> {
   bool by_rows_;
   KineticRowsQuery<S> rows_;  ///< empty for queries node by node
   std::vector<NodePair> stack_;
-  std::vector<RayNode<std::uint32_t>> ray_stack_;
-  RayBodyOrder ray_order_;
+  std::vector<ProbeNode<std::uint32_t>> probe_stack_;
+  BodyOrder probe_order_;
   std::uint64_t first_step_ = 0;
 };
 

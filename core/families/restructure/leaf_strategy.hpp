@@ -74,8 +74,8 @@ class LeafStrategy : public StoredHierarchyStrategy<S>,
   };
 
   void topology_changed(std::uint32_t body) override { prepare(body); }
-  void find_hits(double t, RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits) override {
-    Base::find_hits(t, query, rays, hits);
+  void answer_probes(double t, const Probes<S>& probes) override {
+    Base::answer_probes(t, probes);
     for (std::uint32_t body = 0; body < bodies_.size(); ++body) {
       const RayWork& work = this->ray_work()[body];
       bodies_[body].age.add_rays(work.tests, work.rays);

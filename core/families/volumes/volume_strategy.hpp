@@ -7,7 +7,7 @@
 #include "core/families/wide/near_bodies.hpp"
 #include "core/geometry/volumes/aligned_box.hpp"
 #include "core/topology/leaf_pairs.hpp"
-#include "core/topology/ray_traversal.hpp"
+#include "core/topology/probe_traversal.hpp"
 
 namespace kbvh {
 
@@ -16,7 +16,7 @@ namespace kbvh {
 /// a hierarchy of one body, such as VolumeHierarchy and DopHierarchy.
 template <class S, class... Hierarchies>
 class HierarchyStrategy : public CountedStrategy<S>,
-                          public AnswersRays<S>,
+                          public AnswersProbes<S>,
                           public TakesPlanChanges<S>,
                           public TakesGeometryChanges<S>,
                           public AnswersSelfPairs {
@@ -99,8 +99,8 @@ class HierarchyStrategy : public CountedStrategy<S>,
   std::size_t bytes() const override {
     return std::visit(
         [&](const auto& state) {
-          std::size_t total = near_bodies_.bytes() + ray_order_.bytes() + state.scratch.bytes() +
-                              ray_stack_.capacity() * sizeof(RayNode<std::uint32_t>);
+          std::size_t total = near_bodies_.bytes() + probe_order_.bytes() + state.scratch.bytes() +
+                              probe_stack_.capacity() * sizeof(ProbeNode<std::uint32_t>);
           for (const auto& body : state.bodies) total += body.bytes();
           return total;
         },
@@ -109,20 +109,19 @@ class HierarchyStrategy : public CountedStrategy<S>,
 
  protected:
   /// Follows rays node by node, in the boxes around volumes.
-  void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
-                 std::span<RayHit> hits) override {
+  void answer_probes(double /*t*/, const Probes<S>& probes) override {
     on_bodies([&](const auto& bodies) {
       const auto box_of = [&](std::uint32_t body) {
         return bodies[body].empty() ? Box<double>{} : to_double(enclosing_box(bodies[body].volume(0)));
       };
-      const std::uint64_t all = find_hits_by_body(
-          this->scene_, this->sampled_, query, rays, hits, ray_order_, this->ray_bodies(), box_of,
-          [&](std::uint32_t body, RaySearch<S>& search, std::uint64_t& tests) {
+      const std::uint64_t all = answer_by_body(
+          this->scene_, this->sampled_, probes, probe_order_, this->ray_bodies(), box_of,
+          [&](std::uint32_t body, auto& search, std::uint64_t& tests) {
             const TopologyTree tree{bodies[body].topology(), [&](std::uint32_t node) {
                                       return enclosing_box(bodies[body].volume(node));
                                     }};
-            return follow_ray(tree, search, body, this->scene_.primitives(body),
-                              this->sampled_.positions(body), ray_stack_, tests, this->triangle_stats_);
+            return follow_probe(tree, search, body, this->scene_.primitives(body),
+                                this->sampled_.positions(body), probe_stack_, tests, this->triangle_stats_);
           });
       this->count_.add(Counter::box_tests, all);
     });
@@ -198,8 +197,8 @@ class HierarchyStrategy : public CountedStrategy<S>,
 
   NearBodies near_bodies_;
   std::variant<State<Hierarchies>...> state_;
-  std::vector<RayNode<std::uint32_t>> ray_stack_;
-  RayBodyOrder ray_order_;
+  std::vector<ProbeNode<std::uint32_t>> probe_stack_;
+  BodyOrder probe_order_;
   bool plans_changed_ = false;
 };
 

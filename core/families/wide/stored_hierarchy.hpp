@@ -7,8 +7,8 @@
 #include "core/families/wide/near_bodies.hpp"
 #include "core/families/wide/surface_sums.hpp"
 #include "core/families/wide/swept_hierarchies.hpp"
+#include "core/families/wide/wide_probes.hpp"
 #include "core/families/wide/wide_query.hpp"
-#include "core/families/wide/wide_rays.hpp"
 #include "core/geometry/lane_box.hpp"
 #include "core/topology/topology_edit.hpp"
 
@@ -24,7 +24,7 @@ inline Box<S> leaf_box(std::span<const std::uint32_t> vertices, const S* positio
 /// `update(body)`. Bodies that cannot move are updated at `reset` only. Most strategies derive from
 /// StoredHierarchyStrategy, which also accepts changes of plans.
 template <class S>
-class FixedPlansHierarchyStrategy : public CountedStrategy<S>, public AnswersRays<S>, public ReportsWork {
+class FixedPlansHierarchyStrategy : public CountedStrategy<S>, public AnswersProbes<S>, public ReportsWork {
  public:
   FixedPlansHierarchyStrategy(const SceneView<S>& scene, const SampledMotion<S>& motion,
                               Topologies topologies, const Params& /*params*/,
@@ -35,7 +35,7 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S>, public AnswersRay
   void reset_to(double /*t*/) override {
     plans_changed_ = false;
     near_bodies_.start_over();
-    rays_.start_over();
+    probes_.start_over();
     for (std::uint32_t body = 0; body < hierarchies_.size(); ++body) {
       hierarchies_[body].undo_edits(this->scene_.primitives(body));
       hierarchies_[body].positions_changed();
@@ -84,7 +84,7 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S>, public AnswersRay
   std::size_t bytes() const override {
     std::size_t total = 0;
     for (const auto& hierarchy : hierarchies_) total += hierarchy.bytes();
-    return total + near_bodies_.bytes() + query_.bytes() + rays_.bytes() + (swept_ ? swept_->bytes() : 0);
+    return total + near_bodies_.bytes() + query_.bytes() + probes_.bytes() + (swept_ ? swept_->bytes() : 0);
   }
 
  protected:
@@ -110,18 +110,17 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S>, public AnswersRay
       update(body_change.body);
     }
   }
-  void find_hits(double /*t*/, RayQuery query, std::span<const Ray<S>> rays,
-                 std::span<RayHit> hits) override {
+  void answer_probes(double /*t*/, const Probes<S>& probes) override {
     std::uint64_t tests = 0;
-    rays_.find(
-        query, rays, hits, [&](std::uint32_t body) { return ray_side(body); },
+    probes_.answer(
+        probes, [&](std::uint32_t body) { return ray_side(body); },
         [&](std::uint32_t body, std::uint32_t node) { make_row(body, node); }, this->triangle_stats_, tests,
         this->ray_bodies());
     this->count_.add(Counter::box_tests, tests);
     last_ray_tests_ = tests;
   }
   /// Returns the work of the last call's rays in each body.
-  std::span<const RayWork> ray_work() const { return rays_.work(); }
+  std::span<const RayWork> ray_work() const { return probes_.work(); }
   /// Returns the data of a body that rays read. Lazy strategies add the marks of stale nodes; `make_row` is
   /// then called for these.
   virtual WideSide<S> ray_side(std::uint32_t body) { return side(body); }
@@ -172,7 +171,7 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S>, public AnswersRay
   std::vector<WideHierarchy<S>> hierarchies_;
   NearBodies near_bodies_;
   WideQuery<S> query_{this->scene_, this->sampled_};
-  WideRays<S> rays_{this->scene_, this->sampled_};
+  WideProbes<S> probes_{this->scene_, this->sampled_};
   bool plans_changed_ = false;
   std::uint64_t last_box_tests_ = 0, last_ray_tests_ = 0;
   std::optional<SweptHierarchies<S>> swept_;  ///< made at the first request for contacts

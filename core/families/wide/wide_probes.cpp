@@ -1,8 +1,9 @@
-#include "core/families/wide/wide_rays.hpp"
+#include "core/families/wide/wide_probes.hpp"
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <utility>
 
 #include "core/geometry/ray_box.hpp"
 #include "core/topology/builders.hpp"
@@ -53,13 +54,13 @@ double summed_area(const WideHierarchy<S>& hierarchy) {
 }  // namespace
 
 template <class S>
-WideRays<S>::WideRays(const SceneView<S>& scene, const SampledMotion<S>& motion)
+WideProbes<S>::WideProbes(const SceneView<S>& scene, const SampledMotion<S>& motion)
     : scene_(scene), motion_(motion) {}
 template <class S>
-WideRays<S>::~WideRays() = default;
+WideProbes<S>::~WideProbes() = default;
 
 template <class S>
-void WideRays<S>::refit_bodies() {
+void WideProbes<S>::refit_bodies() {
   const auto has_polygons = [&](std::uint32_t body) {
     return scene_.primitives(body).kind == PrimitiveKind::polygons && !sides_[body].hierarchy->empty();
   };
@@ -107,7 +108,7 @@ void WideRays<S>::refit_bodies() {
 }
 
 template <class S>
-void WideRays<S>::follow(const WideTree<S>& tree, WideRayJob<S>& job, std::vector<WideRayItem<S>>& stack) {
+void WideProbes<S>::follow(const WideTree<S>& tree, WideRayJob<S>& job, std::vector<WideRayItem<S>>& stack) {
   const WideLeafLists leaves = tree.leaf_lists();
   job.ray = &ray_;
   job.first_entry = leaves.first_entry;
@@ -129,8 +130,8 @@ void WideRays<S>::follow(const WideTree<S>& tree, WideRayJob<S>& job, std::vecto
 }
 
 template <class S>
-bool WideRays<S>::enter(std::uint32_t body) {
-  const WideRaySide<S>& side = sides_[body];
+bool WideProbes<S>::enter(std::uint32_t body) {
+  const WideProbeSide<S>& side = sides_[body];
   const Primitives& primitives = scene_.primitives(body);
   motion_.fetch_all(body);
   body_ = body;
@@ -143,11 +144,11 @@ bool WideRays<S>::enter(std::uint32_t body) {
   job.positions = motion_.positions(body);
   job.stale = side.stale;
   job.make = [](void* context, std::uint32_t node) {
-    auto& rays = *static_cast<WideRays*>(context);
+    auto& rays = *static_cast<WideProbes*>(context);
     rays.make_(rays.make_context_, rays.body_, node);
   };
   job.decide = [](void* context, std::uint32_t primitive) {
-    auto& rays = *static_cast<WideRays*>(context);
+    auto& rays = *static_cast<WideProbes*>(context);
     const double limit = rays.search_->limit();
     const bool over =
         rays.search_->offer(rays.body_, primitive, rays.scene_.primitives(rays.body_).triangles(primitive),
@@ -163,7 +164,7 @@ bool WideRays<S>::enter(std::uint32_t body) {
 }
 
 template <class S>
-std::uint64_t WideRays<S>::screen(std::span<const Ray<S>> rays) {
+std::uint64_t WideProbes<S>::screen(std::span<const Ray<S>> rays) {
   if (ids_.empty()) return 0;
   for (std::size_t i = 0; i < rays.size(); ++i) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -182,19 +183,17 @@ std::uint64_t WideRays<S>::screen(std::span<const Ray<S>> rays) {
 }
 
 template <class S>
-void WideRays<S>::run(RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits,
-                      TriangleTestStats& stats, std::uint64_t& tests) {
+void WideProbes<S>::run(const RayProbes<S>& asked, TriangleTestStats& stats) {
   refit_bodies();
-  work_.assign(sides_.size(), {});
   stats_ = &stats;
-  tests_ = 0;
+  const std::span<const Ray<S>> rays = asked.rays;
   for (std::size_t begin = 0; begin < rays.size(); begin += WideRayBlock<S>::size) {
     const std::size_t count = std::min(rays.size() - begin, WideRayBlock<S>::size);
     std::uint64_t met = screen(rays.subspan(begin, count));
-    std::fill_n(hits.begin() + std::ptrdiff_t(begin), count, RayHit{});
+    std::fill_n(asked.hits.begin() + std::ptrdiff_t(begin), count, RayHit{});
     for (; met != 0; met &= met - 1) {
       const std::size_t i = begin + std::size_t(std::countr_zero(met));
-      RaySearch<S> search(rays[i], query);
+      RaySearch<S> search = asked.search(i);
       search_ = &search;
       ray_ = wide_ray(rays[i]);
       if (ids_.size() == 1) {
@@ -203,20 +202,89 @@ void WideRays<S>::run(RayQuery query, std::span<const Ray<S>> rays, std::span<Ra
         WideRayJob<S> job{};
         job.tree = bodies_.arrays();
         job.decide = [](void* context, std::uint32_t primitive) {
-          auto& all = *static_cast<WideRays*>(context);
+          auto& all = *static_cast<WideProbes*>(context);
           return all.enter(all.ids_[primitive]);
         };
         follow(bodies_, job, body_stack_);
       }
-      hits[i] = search.hit();
+      asked.take(i, search);
     }
   }
   search_ = nullptr;
+}
+
+template <class S>
+template <class Search>
+void WideProbes<S>::search_body(std::uint32_t body, Search& search, TriangleTestStats& stats) {
+  const WideProbeSide<S>& side = sides_[body];
+  const Primitives& primitives = scene_.primitives(body);
+  WideTree<S>& hierarchy = *side.hierarchy;
+  const WideArrays<S> arrays = hierarchy.arrays();
+  const S* const bounds = side.child_bounds != nullptr ? side.child_bounds : arrays.child_bounds;
+  const std::size_t width = hierarchy.width();
+  const S* const positions = motion_.positions(body);
+  const auto boxes = search.box_test();
+  nodes_.assign(1, 0);
+  while (!nodes_.empty()) {
+    const std::uint32_t number = nodes_.back();
+    nodes_.pop_back();
+    if (side.stale != nullptr && side.stale[number] != 0) make_(make_context_, body, number);
+    const WideNode node = arrays.nodes[number];
+    const S* const rows = bounds + number * lane_scalars(hierarchy.width());
+    tests_ += node.count;
+    for (std::uint32_t lane = 0; lane < node.count; ++lane) {
+      Box<S> box;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        box.lower[axis] = rows[axis * width + lane];
+        box.upper[axis] = -rows[(axis + 3) * width + lane];
+      }
+      double near = 0;
+      if (!boxes.meet(box, search.limit(), near)) continue;
+      if (lane >= node.leaf_count) {
+        nodes_.push_back(node.first_child + lane - node.leaf_count);
+        continue;
+      }
+      for (const std::uint32_t primitive : hierarchy.leaf_primitives(node.first_leaf + lane))
+        if (search.offer(body, primitive, primitives.triangles(primitive), positions, stats)) return;
+    }
+  }
+}
+
+template <class S>
+template <class Kind>
+void WideProbes<S>::run_by_body(const Kind& probes, TriangleTestStats& stats) {
+  entered_.assign(sides_.size(), 0);
+  for (std::size_t i = 0; i < probes.size(); ++i) {
+    auto search = probes.search(i);
+    const auto boxes = search.box_test();
+    for (std::uint32_t body = 0; body < sides_.size(); ++body) {
+      if (!Kind::meets(scene_.primitives(body).kind) || sides_[body].hierarchy->empty()) continue;
+      double near = 0;
+      ++tests_;
+      if (!boxes.meet(sides_[body].root_box(), search.limit(), near)) continue;
+      if (std::exchange(entered_[body], 1) == 0) motion_.fetch_all(body);
+      search_body(body, search, stats);
+    }
+    probes.take(i, search);
+  }
+}
+
+template <class S>
+void WideProbes<S>::run(const Probes<S>& probes, TriangleTestStats& stats, std::uint64_t& tests,
+                        RayBodies* bodies) {
+  work_.assign(sides_.size(), {});
+  tests_ = 0;
+  if (const auto* rays = std::get_if<RayProbes<S>>(&probes)) {
+    run(*rays, stats);
+    if (bodies != nullptr) count_bodies(rays->rays, *bodies);
+  } else {
+    run_by_body(std::get<BallProbes<S>>(probes), stats);
+  }
   tests += tests_;
 }
 
 template <class S>
-void WideRays<S>::count_bodies(std::span<const Ray<S>> rays, RayBodies& bodies) const {
+void WideProbes<S>::count_bodies(std::span<const Ray<S>> rays, RayBodies& bodies) const {
   for (std::size_t i = 0; i < ids_.size(); ++i) {
     if (work_[ids_[i]].rays != 0) {
       ++bodies.entered;
@@ -225,23 +293,24 @@ void WideRays<S>::count_bodies(std::span<const Ray<S>> rays, RayBodies& bodies) 
     const Box<S> box = sides_[ids_[i]].root_box();
     const bool met = std::any_of(rays.begin(), rays.end(), [&](const Ray<S>& ray) {
       double near = 0;
-      return RaySlabs(RaySearch<S>(ray, RayQuery::any).line()).meet(box, double(ray.length), near);
+      return RaySearch<S>(ray, RayQuery::any).box_test().meet(box, double(ray.length), near);
     });
     ++(met ? bodies.hidden : bodies.unmet);
   }
 }
 
 template <class S>
-std::size_t WideRays<S>::bytes() const {
+std::size_t WideProbes<S>::bytes() const {
   return bodies_.bytes() +
          (primitives_.offsets.capacity() + primitives_.vertices.capacity() + ids_.capacity()) *
              sizeof(std::uint32_t) +
-         corners_.capacity() * sizeof(S) + sides_.capacity() * sizeof(WideRaySide<S>) +
+         corners_.capacity() * sizeof(S) + sides_.capacity() * sizeof(WideProbeSide<S>) +
          work_.capacity() * sizeof(RayWork) +
-         (body_stack_.capacity() + stack_.capacity()) * sizeof(WideRayItem<S>);
+         (body_stack_.capacity() + stack_.capacity()) * sizeof(WideRayItem<S>) +
+         nodes_.capacity() * sizeof(std::uint32_t) + entered_.capacity();
 }
 
-template class WideRays<float>;
-template class WideRays<double>;
+template class WideProbes<float>;
+template class WideProbes<double>;
 
 }  // namespace kbvh

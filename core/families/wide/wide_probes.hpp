@@ -6,23 +6,23 @@
 #include "core/families/wide/kernels/wide_rays.hpp"
 #include "core/families/wide/wide_hierarchy.hpp"
 #include "core/families/wide/wide_query.hpp"
-#include "core/scene/rays.hpp"
+#include "core/scene/probes.hpp"
 
 namespace kbvh {
 
-/// The data of one body that rays read.
+/// The data of one body that probes read.
 template <class S>
-struct WideRaySide {
+struct WideProbeSide {
   WideTree<S>* hierarchy;
   /// stale[wide node] is not 0 while the boxes of the node's children must be made; null: all are current.
   const std::uint8_t* stale = nullptr;
-  /// A box around the body; without one, rays use that of the hierarchy's root, which must be current.
+  /// A box around the body; without one, probes use that of the hierarchy's root, which must be current.
   std::optional<Box<S>> root{};
   /// Boxes of children as in `WideArrays`, in place of the hierarchy's; null: those of the hierarchy.
   S* child_bounds = nullptr;
 
-  WideRaySide(WideTree<S>* tree, const std::uint8_t* stale_nodes) : hierarchy(tree), stale(stale_nodes) {}
-  WideRaySide(const WideSide<S>& side) : hierarchy(side.hierarchy), stale(side.stale) {}
+  WideProbeSide(WideTree<S>* tree, const std::uint8_t* stale_nodes) : hierarchy(tree), stale(stale_nodes) {}
+  WideProbeSide(const WideSide<S>& side) : hierarchy(side.hierarchy), stale(side.stale) {}
 
   Box<S> root_box() const { return root ? *root : hierarchy->root_box(); }
 };
@@ -33,54 +33,61 @@ struct RayWork {
   std::uint64_t rays = 0;   ///< that entered it
 };
 
-/// Answers rays over the wide hierarchies of all bodies of a scene; keeps its buffers from call to call. A
-/// tree over the bodies' boxes, refitted at each call and rebuilt when the bodies have mixed, leads to the
-/// bodies, which are searched nearest first. This is occlusion culling: a body behind the hits of all rays is
-/// never searched, its positions are not fetched, and none of its stale boxes are made.
+/// Answers probes over the wide hierarchies of all bodies of a scene; keeps its buffers from call to call.
+///
+/// For rays, a tree over the bodies' boxes, refitted at each call and rebuilt when the bodies have mixed,
+/// leads to the bodies, which are searched nearest first. This is occlusion culling: a body behind the hits
+/// of all rays is never searched, its positions are not fetched, and none of its stale boxes are made. Other
+/// probes search body by body.
 template <class S>
-class WideRays {
+class WideProbes {
  public:
-  WideRays(const SceneView<S>& scene, const SampledMotion<S>& motion);
-  ~WideRays();
-  WideRays(const WideRays&) = delete;
-  WideRays& operator=(const WideRays&) = delete;
+  WideProbes(const SceneView<S>& scene, const SampledMotion<S>& motion);
+  ~WideProbes();
+  WideProbes(const WideProbes&) = delete;
+  WideProbes& operator=(const WideProbes&) = delete;
 
-  /// Sets hits[i] to the answer to rays[i]. side_of(body) returns the WideRaySide<S> of a body, or its
-  /// WideSide<S>. make(body, wide node) computes the boxes of the node's children and clears the node's mark;
-  /// all positions of the body are then current. Adds box tests, including those of the filter of triangles,
-  /// to `tests`, and the call's work in each body to `bodies`; null: this is not counted.
+  /// Answers `probes`. side_of(body) returns the WideProbeSide<S> of a body, or its WideSide<S>.
+  /// make(body, wide node) computes the boxes of the node's children and clears the node's mark; all
+  /// positions of the body are then current. Adds box tests, including those of the filter of triangles, to
+  /// `tests`, and how rays treated each body to `bodies`; null: this is not counted.
   template <class SideOf, class Make>
-  void find(RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits, const SideOf& side_of,
-            const Make& make, TriangleTestStats& stats, std::uint64_t& tests, RayBodies* bodies = nullptr) {
+  void answer(const Probes<S>& probes, const SideOf& side_of, const Make& make, TriangleTestStats& stats,
+              std::uint64_t& tests, RayBodies* bodies = nullptr) {
     sides_.clear();
     for (std::uint32_t body = 0; body < scene_.body_count(); ++body) sides_.push_back(side_of(body));
     make_context_ = const_cast<Make*>(&make);
     make_ = [](void* context, std::uint32_t body, std::uint32_t node) {
       (*static_cast<const Make*>(context))(body, node);
     };
-    run(query, rays, hits, stats, tests);
-    if (bodies != nullptr) count_bodies(rays, *bodies);
+    run(probes, stats, tests, bodies);
   }
   /// Does the same for hierarchies whose boxes are all current.
   template <class SideOf>
-  void find(RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits, const SideOf& side_of,
-            TriangleTestStats& stats, std::uint64_t& tests, RayBodies* bodies = nullptr) {
-    find(
-        query, rays, hits, side_of, [](std::uint32_t, std::uint32_t) {}, stats, tests, bodies);
+  void answer(const Probes<S>& probes, const SideOf& side_of, TriangleTestStats& stats, std::uint64_t& tests,
+              RayBodies* bodies = nullptr) {
+    answer(
+        probes, side_of, [](std::uint32_t, std::uint32_t) {}, stats, tests, bodies);
   }
 
   /// Rebuilds the tree over the bodies at the next call, so that a restarted clip costs the same as the first
   /// run.
   void start_over() { built_area_ = -1; }
 
-  /// Returns the work of the last call for each body.
+  /// Returns the work of the last call's rays in each body; 0 for other probes.
   std::span<const RayWork> work() const { return work_; }
 
   std::size_t bytes() const;
 
  private:
-  void run(RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits, TriangleTestStats& stats,
-           std::uint64_t& tests);
+  void run(const Probes<S>& probes, TriangleTestStats& stats, std::uint64_t& tests, RayBodies* bodies);
+  void run(const RayProbes<S>& rays, TriangleTestStats& stats);
+  /// Answers any probes body by body, without a kernel of their own.
+  template <class Kind>
+  void run_by_body(const Kind& probes, TriangleTestStats& stats);
+  /// Follows one search through one body.
+  template <class Search>
+  void search_body(std::uint32_t body, Search& search, TriangleTestStats& stats);
   void refit_bodies();
   void count_bodies(std::span<const Ray<S>> rays, RayBodies& bodies) const;
   /// Returns bit i unless rays[i] certainly misses all bodies; takes at most as many rays as a block has.
@@ -91,7 +98,7 @@ class WideRays {
 
   SceneView<S> scene_;
   SampledMotion<S> motion_;
-  std::vector<WideRaySide<S>> sides_;
+  std::vector<WideProbeSide<S>> sides_;
   std::vector<RayWork> work_;  ///< [body], by this call
   void* make_context_ = nullptr;
   void (*make_)(void* context, std::uint32_t body, std::uint32_t node) = nullptr;
@@ -102,6 +109,8 @@ class WideRays {
   std::vector<S> corners_;          ///< [primitive][lower, upper][3], one scalar past the end
   double built_area_ = -1;          ///< sum over its nodes when it was built; negative: to be built
   std::vector<WideRayItem<S>> body_stack_, stack_;
+  std::vector<std::uint32_t> nodes_;   ///< to be visited by `search_body`
+  std::vector<std::uint8_t> entered_;  ///< [body], of this call, if it is no call of rays
   WideRayBlock<S> block_{};
   // The current ray.
   WideRay<S> ray_{};
@@ -111,7 +120,7 @@ class WideRays {
   std::uint64_t tests_ = 0;
 };
 
-extern template class WideRays<float>;
-extern template class WideRays<double>;
+extern template class WideProbes<float>;
+extern template class WideProbes<double>;
 
 }  // namespace kbvh

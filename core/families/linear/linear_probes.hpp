@@ -5,31 +5,30 @@
 #include <vector>
 
 #include "core/families/linear/linear_bounds.hpp"
-#include "core/families/wide/wide_rays.hpp"
+#include "core/families/wide/wide_probes.hpp"
 
 namespace kbvh {
 
-/// Answers rays at a time of a segment whose boxes are linear in time. A box is interpolated when a ray first
-/// reads it. A body that is apart from all others has only one box in the segment: its boxes are computed
-/// from its positions when a ray enters it.
+/// Answers probes at a time of a segment whose boxes are linear in time. A box is interpolated when a probe
+/// first reads it. A body that is apart from all others has only one box in the segment: its boxes are
+/// computed from its positions when a probe enters it.
 template <class S>
-class LinearRays {
+class LinearProbes {
  public:
-  LinearRays(const SceneView<S>& scene, const SampledMotion<S>& motion)
-      : rays_(scene, motion), motion_(motion) {}
+  LinearProbes(const SceneView<S>& scene, const SampledMotion<S>& motion)
+      : probes_(scene, motion), motion_(motion) {}
 
-  /// Sets hits[i] to the answer to rays[i] at t, the time of the motion. stale[body][wide node] must be
+  /// Answers probes at t, the time of the motion. stale[body][wide node] must be
   /// nonzero unless the boxes of the node's children in the body's hierarchy are those at t. The other
-  /// parameters are those of WideRays.
-  void find(LinearBounds<S>& bounds, double t, std::vector<std::vector<std::uint8_t>>& stale, RayQuery query,
-            std::span<const Ray<S>> rays, std::span<RayHit> hits, TriangleTestStats& stats,
-            std::uint64_t& tests, RayBodies* bodies) {
+  /// parameters are those of WideProbes.
+  void answer(LinearBounds<S>& bounds, double t, std::vector<std::vector<std::uint8_t>>& stale,
+              const Probes<S>& probes, TriangleTestStats& stats, std::uint64_t& tests, RayBodies* bodies) {
     moments_.clear();
     for (std::uint32_t body = 0; body < bounds.body_count(); ++body)
       moments_.push_back({bounds.hierarchy(body).arrays(), bounds.side(body).ends(), stale[body].data(),
                           bounds.fraction(t)});
     const auto side_of = [&](std::uint32_t body) {
-      WideRaySide<S> side(&bounds.hierarchy(body), stale[body].data());
+      WideProbeSide<S> side(&bounds.hierarchy(body), stale[body].data());
       if (!side.hierarchy->empty()) side.root = root_at(bounds.side(body), moments_[body].fraction);
       return side;
     };
@@ -43,10 +42,10 @@ class LinearRays {
       wide_linear_kernels<S>(hierarchy.kernels()).make(hierarchy.width())(moments_[body], node);
       stale[body][node] = 0;
     };
-    rays_.find(query, rays, hits, side_of, make, stats, tests, bodies);
+    probes_.answer(probes, side_of, make, stats, tests, bodies);
   }
 
-  std::size_t bytes() const { return rays_.bytes() + moments_.capacity() * sizeof(WideMoment<S>); }
+  std::size_t bytes() const { return probes_.bytes() + moments_.capacity() * sizeof(WideMoment<S>); }
 
  private:
   /// Interpolates the box of a body. The margin covers all roundings but the last.
@@ -61,7 +60,7 @@ class LinearRays {
     return box;
   }
 
-  WideRays<S> rays_;
+  WideProbes<S> probes_;
   SampledMotion<S> motion_;
   std::vector<WideMoment<S>> moments_;  ///< [body], of the current call
 };

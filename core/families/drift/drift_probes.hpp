@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/families/drift/drift_body.hpp"
-#include "core/families/wide/wide_rays.hpp"
+#include "core/families/wide/wide_probes.hpp"
 
 namespace kbvh {
 
@@ -24,27 +24,27 @@ StoredBoxes stored_boxes(const DriftBody<S>& body, bool listed) {
   return listed && body.watch == DriftBody<S>::Watch::drift ? StoredBoxes::old : StoredBoxes::current;
 }
 
-/// Answers rays in boxes that were made at an earlier frame. When rays first read a box, it is inflated by
-/// the displacements since then.
+/// Answers probes in boxes that were made at an earlier frame. When a probe first reads a box, it is inflated
+/// by the displacements since then.
 template <class S>
-class DriftRays {
+class DriftProbes {
  public:
-  DriftRays(const SceneView<S>& scene, const SampledMotion<S>& motion)
-      : rays_(scene, motion), motion_(motion) {}
+  DriftProbes(const SceneView<S>& scene, const SampledMotion<S>& motion)
+      : probes_(scene, motion), motion_(motion) {}
 
   /// Registers that bodies may have moved, or boxes were made.
   void moved() { ++moment_; }
 
-  /// Sets hits[i] to the answer to rays[i] at the time of the motion. `stored_boxes` returns the state of the
-  /// boxes of hierarchies[body]; unknown ones are computed from positions when a ray enters the body. The
-  /// other parameters are those of WideRays.
-  void find(std::vector<WideHierarchy<S>>& hierarchies, const std::vector<DriftBody<S>>& bodies, bool listed,
-            RayQuery query, std::span<const Ray<S>> rays, std::span<RayHit> hits, TriangleTestStats& stats,
-            std::uint64_t& tests, RayBodies* counts) {
+  /// Answers probes at the time of the motion. `stored_boxes` returns the state of the
+  /// boxes of hierarchies[body]; unknown ones are computed from positions when a probe enters the body. The
+  /// other parameters are those of WideProbes.
+  void answer(std::vector<WideHierarchy<S>>& hierarchies, const std::vector<DriftBody<S>>& bodies,
+              bool listed, const Probes<S>& probes, TriangleTestStats& stats, std::uint64_t& tests,
+              RayBodies* counts) {
     if (moving_.empty()) make_room(hierarchies);
     const auto side_of = [&](std::uint32_t body) {
       WideHierarchy<S>& hierarchy = hierarchies[body];
-      WideRaySide<S> side(&hierarchy, nullptr);
+      WideProbeSide<S> side(&hierarchy, nullptr);
       if (hierarchy.empty()) return side;
       Moving& moving = moving_[body];
       moving.boxes = stored_boxes(bodies[body], listed);
@@ -74,11 +74,11 @@ class DriftRays {
         }
       moving.stale[node] = 0;
     };
-    rays_.find(query, rays, hits, side_of, make, stats, tests, counts);
+    probes_.answer(probes, side_of, make, stats, tests, counts);
   }
 
   std::size_t bytes() const {
-    std::size_t total = rays_.bytes() + moving_.capacity() * sizeof(Moving);
+    std::size_t total = probes_.bytes() + moving_.capacity() * sizeof(Moving);
     for (const Moving& one : moving_) total += one.child_bounds.size() * sizeof(S) + one.stale.size();
     return total;
   }
@@ -132,7 +132,7 @@ class DriftRays {
     return rounded;
   }
 
-  WideRays<S> rays_;
+  WideProbes<S> probes_;
   SampledMotion<S> motion_;
   std::vector<Moving> moving_;  ///< [body], from the first call on
   std::uint64_t moment_ = 1;

@@ -1,9 +1,12 @@
-#include "core/judge/ray_oracle.hpp"
+#include "core/judge/probe_oracle.hpp"
 
+#include <algorithm>
+#include <iterator>
 #include <limits>
 #include <vector>
 
 #include "core/judge/polygon_region.hpp"
+#include "core/scene/distance_comparison.hpp"
 
 namespace kbvh {
 
@@ -60,6 +63,58 @@ void brute_force_hits(const Scene<S>& scene, Playback<S>& playback, RayQuery que
   }
 }
 
+template <class S>
+BallHits brute_force_within(const Scene<S>& scene, Playback<S>& playback, std::span<const Ball<S>> balls) {
+  playback.evaluate_all();
+  BallHits found;
+  for (std::uint32_t i = 0; i < balls.size(); ++i) {
+    const auto point = [](const S* p) {
+      const double exact[3] = {double(p[0]), double(p[1]), double(p[2])};
+      return DistanceComparison<Dyadic>::point(exact);
+    };
+    const auto centre = point(balls[i].centre);
+    DistanceComparison<Dyadic> distance{double(balls[i].radius)};
+    for (std::uint32_t body = 0; body < scene.bodies.size(); ++body) {
+      const Primitives& primitives = scene.bodies[body].primitives;
+      if (primitives.kind == PrimitiveKind::control_nets) continue;
+      const auto corner = [&](std::uint32_t vertex) {
+        return point(playback.positions(body) + std::size_t(3) * vertex);
+      };
+      for (std::uint32_t p = 0; p < primitives.count(); ++p) {
+        if (!primitives.alive(p)) continue;
+        const PolygonTriangles triangles = primitives.triangles(p);
+        bool met = false;
+        for (std::uint32_t k = 0; k < triangles.count() && !met; ++k) {
+          const auto corners = triangles[k];
+          met = distance.point_triangle(centre, corner(corners[0]), corner(corners[1]), corner(corners[2]));
+        }
+        if (met) found.push_back({i, body, p});
+      }
+    }
+  }
+  return found;
+}
+
+RayCheck compare_within(std::size_t balls, const BallHits& found, const BallHits& truth) {
+  RayCheck check;
+  check.rays = balls;
+  check.hits = truth.size();
+  BallHits missed, extra;
+  std::set_difference(truth.begin(), truth.end(), found.begin(), found.end(), std::back_inserter(missed));
+  std::set_difference(found.begin(), found.end(), truth.begin(), truth.end(), std::back_inserter(extra));
+  check.missed = missed.size();
+  check.extra = extra.size();
+  const auto told = [](const BallHit& hit) {
+    return "point " + std::to_string(hit.ball) + ": " + std::to_string(hit.body) + ":" +
+           std::to_string(hit.primitive);
+  };
+  if (!missed.empty())
+    check.first_violation = told(missed[0]) + " is within the radius, and is missed";
+  else if (!extra.empty())
+    check.first_violation = told(extra[0]) + " is reported too often, or is not within the radius";
+  return check;
+}
+
 void RayCheck::add(const RayCheck& other) {
   rays += other.rays;
   hits += other.hits;
@@ -98,6 +153,7 @@ RayCheck compare_hits(const Scene<S>& scene, const Playback<S>& playback, RayQue
 }
 
 #define KBVH_INSTANTIATE(S)                                                                              \
+  template BallHits brute_force_within(const Scene<S>&, Playback<S>&, std::span<const Ball<S>>);         \
   template void brute_force_hits(const Scene<S>&, Playback<S>&, RayQuery, std::span<const Ray<S>>,       \
                                  std::span<RayHit>);                                                     \
   template RayCheck compare_hits(const Scene<S>&, const Playback<S>&, RayQuery, std::span<const Ray<S>>, \

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "core/scene/playback.hpp"
-#include "core/scene/rays.hpp"
+#include "core/scene/probes.hpp"
 
 namespace kbvh {
 
@@ -37,7 +37,15 @@ RayCheck compare_hits(const Scene<S>& scene, const Playback<S>& playback, RayQue
                       std::span<const Ray<S>> rays, std::span<const RayHit> found,
                       std::span<const RayHit> truth);
 
-/// Does the same with the truth by brute force.
+/// Finds the primitives within balls at the playback's current time, sorted, by measuring the distance to
+/// every living primitive in exact arithmetic: neither boxes nor filters. O(balls x primitives).
+template <class S>
+BallHits brute_force_within(const Scene<S>& scene, Playback<S>& playback, std::span<const Ball<S>> balls);
+
+/// Compares sorted answers to `balls` balls with the truth: every primitive within a ball counts.
+RayCheck compare_within(std::size_t balls, const BallHits& found, const BallHits& truth);
+
+/// Does the same as `compare_hits`, with the truth by brute force.
 template <class S>
 RayCheck check_hits(const Scene<S>& scene, Playback<S>& playback, RayQuery query,
                     std::span<const Ray<S>> rays, std::span<const RayHit> found);
