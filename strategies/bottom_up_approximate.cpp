@@ -47,7 +47,7 @@ class ReducedBase : public SlabStrategy<S, Base> {
   void reset_to(double /*t*/) override {
     this->plans_changed_ = false;
     this->near_bodies_.start_over();
-    this->rays_.start_over();
+    this->probes_.start_over();
     frame_ = 0;
     margins_.clear();
     for (std::uint32_t body = 0; body < this->hierarchies_.size(); ++body) {

@@ -70,7 +70,7 @@ class InflatedLazy final : public StoredHierarchyStrategy<S> {
 
   void reset_to(double /*t*/) override {
     this->near_bodies_.start_over();
-    this->rays_.start_over();
+    this->probes_.start_over();
     for (std::uint32_t index = 0; index < bodies_.size(); ++index) {
       Body& body = bodies_[index];
       this->hierarchies_[index].positions_changed();

@@ -94,6 +94,22 @@ class Answers(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "closest or any, not 'all'"):
             world.hits(origins, origins, query="all")
 
+    def test_within(self):
+        corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 3], [1, 0, 3], [0, 1, 3]], float)
+        body = kbvh.Body([[0, 1, 2], [3, 4, 5]], corners)
+        for precision in ("float32", "float64"):
+            for id in ("bottom_up", "kinetic_aabb", "interval_join", "auto", "brute_force"):
+                world = kbvh.World([body], id, precision=precision)
+                found = world.within([[0.25, 0.25, 1], [0.25, 0.25, 1.5], [3, 4, 0]], [1, 1.5, 0.5])
+                self.assertEqual(found.tolist(), [(0, 0, 0), (1, 0, 0), (1, 0, 1)], id)
+                self.assertEqual(len(world.within([[0.25, 0.25, 1]], np.nextafter(np.float32(1), 0))), 0, id)
+        with self.assertRaisesRegex(ValueError, "radius -1"):
+            world.within([[0, 0, 0]], -1)
+        with self.assertRaisesRegex(ValueError, r"points are \[point\]\[3\]"):
+            world.within([[0, 0, 0, 0]], 1)
+        with self.assertRaisesRegex(ValueError, "radii are no real numbers"):
+            world.within([[0, 0, 0]], "a")
+
     def test_contacts_between_keyframes(self):
         world = kbvh.World(falling(), "bottom_up")
         found = world.contacts(1.0)
