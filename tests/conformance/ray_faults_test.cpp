@@ -107,9 +107,10 @@ class Simple : public CountedStrategy<S>,
     }
     // Uses the bodies' boxes from the time when they were made.
     order_.start(this->scene_, &RayProbes<S>::meets, box_of);
+    using Reach = decltype(limit);
     struct Search {
       RaySlabs boxes;
-      decltype(limit) reach;
+      Reach reach;
       RaySlabs box_test() const { return boxes; }
       double limit() const { return reach(); }
     };
