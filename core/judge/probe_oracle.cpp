@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <iterator>
 #include <limits>
+#include <type_traits>
 #include <vector>
 
 #include "core/judge/polygon_region.hpp"
@@ -63,30 +64,49 @@ void brute_force_hits(const Scene<S>& scene, Playback<S>& playback, RayQuery que
   }
 }
 
+namespace {
+
+/// Returns whether a ball meets a closed triangle, in exact arithmetic where bounded doubles do not decide.
+bool ball_meets(const double* centre, double radius, const double (&corners)[3][3]) {
+  for (int axis = 0; axis < 3; ++axis) {
+    // The rounding of a difference is monotone, so a rounded gap beyond the radius is a gap beyond it.
+    const auto [low, high] = std::minmax({corners[0][axis], corners[1][axis], corners[2][axis]});
+    if (low - centre[axis] > radius || centre[axis] - high > radius) return false;
+  }
+  const auto compare = [&](auto& distance) {
+    using Comparison = std::remove_reference_t<decltype(distance)>;
+    return distance.point_triangle(Comparison::point(centre), Comparison::point(corners[0]),
+                                   Comparison::point(corners[1]), Comparison::point(corners[2]));
+  };
+  DistanceComparison<BoundedDouble> filtered(radius);
+  const bool met = compare(filtered);
+  if (!filtered.undecided()) return met;
+  DistanceComparison<Dyadic> exact(radius);
+  return compare(exact);
+}
+
+}  // namespace
+
 template <class S>
 BallHits brute_force_within(const Scene<S>& scene, Playback<S>& playback, std::span<const Ball<S>> balls) {
   playback.evaluate_all();
   BallHits found;
   for (std::uint32_t i = 0; i < balls.size(); ++i) {
-    const auto point = [](const S* p) {
-      const double exact[3] = {double(p[0]), double(p[1]), double(p[2])};
-      return DistanceComparison<Dyadic>::point(exact);
-    };
-    const auto centre = point(balls[i].centre);
-    DistanceComparison<Dyadic> distance{double(balls[i].radius)};
+    const auto& [at, radius] = balls[i];
+    const double centre[3] = {double(at[0]), double(at[1]), double(at[2])};
     for (std::uint32_t body = 0; body < scene.bodies.size(); ++body) {
       const Primitives& primitives = scene.bodies[body].primitives;
       if (primitives.kind == PrimitiveKind::control_nets) continue;
-      const auto corner = [&](std::uint32_t vertex) {
-        return point(playback.positions(body) + std::size_t(3) * vertex);
-      };
       for (std::uint32_t p = 0; p < primitives.count(); ++p) {
         if (!primitives.alive(p)) continue;
         const PolygonTriangles triangles = primitives.triangles(p);
         bool met = false;
         for (std::uint32_t k = 0; k < triangles.count() && !met; ++k) {
-          const auto corners = triangles[k];
-          met = distance.point_triangle(centre, corner(corners[0]), corner(corners[1]), corner(corners[2]));
+          double corners[3][3];
+          for (std::size_t c = 0; c < 3; ++c)
+            for (std::size_t axis = 0; axis < 3; ++axis)
+              corners[c][axis] = double(playback.positions(body)[std::size_t(3) * triangles[k][c] + axis]);
+          met = ball_meets(centre, double(radius), corners);
         }
         if (met) found.push_back({i, body, p});
       }

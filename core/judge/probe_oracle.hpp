@@ -37,8 +37,9 @@ RayCheck compare_hits(const Scene<S>& scene, const Playback<S>& playback, RayQue
                       std::span<const Ray<S>> rays, std::span<const RayHit> found,
                       std::span<const RayHit> truth);
 
-/// Finds the primitives within balls at the playback's current time, sorted, by measuring the distance to
-/// every living primitive in exact arithmetic: neither boxes nor filters. O(balls x primitives).
+/// Finds the primitives within balls at the playback's current time, sorted, by comparing the distance to
+/// every living primitive, in exact arithmetic where bounded doubles do not decide: no boxes of bodies or
+/// nodes. O(balls x primitives).
 template <class S>
 BallHits brute_force_within(const Scene<S>& scene, Playback<S>& playback, std::span<const Ball<S>> balls);
 

@@ -353,8 +353,8 @@ TEST(Peers, RaysDifferFromTheTruthSeldom) {
         std::vector<Ray<float>> general;  // the first kind: through the scene
         for (std::size_t i = 0; i < rays.size(); i += 8) general.push_back(rays[i]);
         std::vector<RayHit> found(general.size()), any(general.size()), truth(general.size());
-        session.probe(RayProbes<S>{RayQuery::closest, general, std::span<RayHit>(found)}, ignored);
-        session.probe(RayProbes<S>{RayQuery::any, general, std::span<RayHit>(any)}, ignored);
+        session.probe(RayProbes<float>{RayQuery::closest, general, std::span<RayHit>(found)}, ignored);
+        session.probe(RayProbes<float>{RayQuery::any, general, std::span<RayHit>(any)}, ignored);
         brute_force_hits<float>(scene, session.playback(), RayQuery::closest, general,
                                 std::span<RayHit>(truth));
         for (std::size_t i = 0; i < general.size(); ++i) {

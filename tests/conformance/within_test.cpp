@@ -5,7 +5,7 @@
 
 #include <map>
 
-#include "core/kernels/kernel_set.hpp"
+#include "core/scene/distance_comparison.hpp"
 #include "tests/conformance/within_check.hpp"
 
 namespace kbvh::test::within_test {
@@ -75,6 +75,44 @@ TEST(WithinInEveryWay, IsWhatEveryPrimitiveSays) {
       }
   }
   EXPECT_GT(hits, 1000U);
+}
+
+/// The exact comparison alone, without filters, as a check of the oracle.
+template <class S>
+void oracle_is_exact(const char* name) {
+  const auto test = synthetic_scene<S>(name);
+  Playback<S> playback(test.scene);
+  playback.seek(frame_times(test.scene, 1)[0]);
+  playback.evaluate_all();
+  const std::vector<Ball<S>> balls = balls_at(test.scene, playback, 3, 7);
+  BallHits exact;
+  for (std::uint32_t i = 0; i < balls.size(); ++i)
+    for (std::uint32_t body = 0; body < test.scene.bodies.size(); ++body)
+      for (std::uint32_t p = 0; p < test.scene.bodies[body].primitives.count(); ++p) {
+        const PolygonTriangles triangles = test.scene.bodies[body].primitives.triangles(p);
+        bool met = false;
+        for (std::uint32_t k = 0; k < triangles.count() && !met; ++k) {
+          const auto point = [&](const S* at) {
+            const double numbers[3] = {double(at[0]), double(at[1]), double(at[2])};
+            return DistanceComparison<Dyadic>::point(numbers);
+          };
+          const auto corner = [&](std::size_t c) {
+            return point(playback.positions(body) + std::size_t(3) * triangles[k][c]);
+          };
+          DistanceComparison<Dyadic> distance{double(balls[i].radius)};
+          met = distance.point_triangle(point(balls[i].centre), corner(0), corner(1), corner(2));
+        }
+        if (met) exact.push_back({i, body, p});
+      }
+  EXPECT_EQ(brute_force_within<S>(test.scene, playback, balls), exact) << name;
+  EXPECT_FALSE(exact.empty()) << name;
+}
+
+TEST(WithinOracle, IsExact) {
+  for (const char* name : {"soups", "polygons", "sheets", "integer_ties"}) {
+    oracle_is_exact<float>(name);
+    oracle_is_exact<double>(name);
+  }
 }
 
 TEST(WithinOfStrategies, IsRefusedByPeersThatAnswerRaysAlone) {
