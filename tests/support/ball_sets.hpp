@@ -1,10 +1,12 @@
 #pragma once
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <random>
 #include <vector>
 
+#include "core/motion/admissible.hpp"
 #include "core/scene/playback.hpp"
 #include "core/scene/probes.hpp"
 
@@ -55,6 +57,11 @@ std::vector<Ball<S>> balls_at(const Scene<S>& scene, const Playback<S>& playback
     balls.push_back(ball);
     ball.radius = std::nextafter(radius, 2 * radius);
     balls.push_back(ball);
+  }
+  for (Ball<S>& ball : balls) {
+    const S most = admissible_magnitude<S>;
+    for (S& coordinate : ball.centre) coordinate = std::clamp(coordinate, -most, most);
+    ball.radius = std::min(ball.radius, most);
   }
   return balls;
 }
