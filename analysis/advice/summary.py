@@ -13,7 +13,7 @@ from advice import advice
 from advice.advice import Advice, Cell, Situation
 from claims import claims as paper_claims
 from claims.claims import CONDITION, FAILS, HOLDS, OPEN, Claims
-from figures import time_error
+from figures import time_error_panels
 from ratios import ratios
 from results import text
 from results.load import OLD_SCHEMA, Study
@@ -148,7 +148,7 @@ class Sentence:
     place: str
 
 
-def sentences(study: Study, found: Sequence[Situation], errors: Sequence[time_error.Shown], known: Paper) -> list[Sentence]:
+def sentences(study: Study, found: Sequence[Situation], errors: Sequence[time_error_panels.Shown], known: Paper) -> list[Sentence]:
     """Returns the five lines of the top; four in a study of other questions than pairs of two bodies."""
     pairs = [one for one in found if one.asks == advice.PAIRS]
     others: dict[str, Situation] = {one.asks: one for one in found if one.asks != advice.PAIRS}  # the one with the most frames a keyframe

@@ -18,6 +18,7 @@ ROOT = HERE.parents[1]
 sys.path[:0] = [str(HERE), str(HERE.parent)]
 
 import claims_page  # noqa: E402
+import error_page  # noqa: E402
 import lessons_page  # noqa: E402
 import python_pages  # noqa: E402
 import strategy_pages  # noqa: E402
@@ -78,6 +79,7 @@ triangle in a leaf. Time is update and query together, of the median of several 
 #: The links that lead on from the first page: page, question, answer.
 WAYS = [
     ("analysis/guides/choosing.html", "What do I take?", "Which strategy suits your motion, and what it costs."),
+    ("errors.html", "What does exactness cost?", "Time against error: what fast wrong answers miss."),
     ("claims.html", "Does the paper hold?", "Each claim of 2006, measured, with its verdict."),
     ("lessons.html", "How does it work?", "A course of nine lessons, with the lab inside."),
 ]
@@ -146,6 +148,7 @@ def main() -> int:
     (pages / "adr.md").write_text(decisions(pages_of_tree))
     strategy_pages.write(listed, results, ROOT, pages)
     (pages / "claims.md").write_text(claims_page.page(results))
+    (pages / "errors.md").write_text(error_page.page(results))
     (pages / "report.md").write_text(report_page(html, results))
     (pages / "python.md").write_text(python_pages.reference(ROOT / "analysis" / "kbvh"))
     (pages / "notebooks.md").write_text(notebooks(run, pages))

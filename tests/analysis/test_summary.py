@@ -15,7 +15,7 @@ from test_advice import other
 
 from advice import advice, summary
 from claims import claims
-from figures import time_error
+from figures import time_error, time_error_panels
 from results.load import Study, load
 
 
@@ -83,7 +83,7 @@ class TestSentences(unittest.TestCase):
     def said(self, lines: list[dict[str, Any]]) -> dict[str, str]:
         study = self.study(lines)
         known = summary.Paper([], "")
-        found = summary.sentences(study, advice.situations(study), time_error.shown(study), known)
+        found = summary.sentences(study, advice.situations(study), time_error_panels.shown(time_error.places(study)), known)
         return {one.subject: one.says for one in found}
 
     def test_what_to_take_follows_the_rule(self) -> None:
