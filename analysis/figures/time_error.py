@@ -259,9 +259,9 @@ def finding(place: Place, name: str) -> str:
         deepest = max(few, key=measure.of, default=None)
         first = f"Contestants that miss less than 1\u00a0% of the pairs miss none deeper than {measure.says(deepest)} ({deepest.name}); " if deepest else ""
         return f"{first}{'t' if first else 'T'}he deepest miss of all is {measure.says(most)} ({most.name})."
-    soon = [one for one in errs if one.first is not None and one.first < 10]
+    soon = [one for one in errs if one.first is not None and most.first is not None and one.first < most.first + 10]
     return (
-        f"{len(soon)} of the {len(errs)} that miss a pair do so within the first ten of {text.count(most.frames)} frames; "
+        f"{len(soon)} of the {len(errs)} that miss a pair begin within ten frames of the first of them ({measure.says(most)} of {text.count(most.frames)}); "
         f"the last to begin is {least.name}, at {measure.says(least)}."
     )
 

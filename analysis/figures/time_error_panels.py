@@ -59,7 +59,7 @@ def _symbol(colour: str, marker: str) -> Markup:
 # ---- Drawing
 
 WIDTH, HEIGHT = 420, 348
-LEFT, RIGHT, TOP, BOTTOM = 48, 10, 44, 40  #: names of the vertical lines stand above the top, where no mark is
+LEFT, RIGHT, TOP, BOTTOM = 60, 10, 44, 40  #: names of the vertical lines stand above the top, where no mark is
 HEAD = 16  #: room for a label above the largest share
 STRIP = 20  #: height of the strip of exact zeros
 FONT = 6.4  #: width of a character, for labels that keep apart
@@ -167,9 +167,11 @@ def _labels(
     place: Place, points: Sequence[Point], front: Sequence[Point], scale: Scale, share: Callable[[Point], float], looks: dict[str, tuple[str, str]]
 ) -> list[str]:
     """Writes the numbers of the front, then the values at both ends of each dial in the dial's colour, next to their marks. Labels cover
-    neither marks nor each other, and two on a line have a gap between them; values without room are left out, numbers are led further away.
+    neither marks nor each other, values no dial, and two on a line have a gap between them; values without room are left out, numbers are
+    led further away.
     """
     taken = [(scale.x(one.time), scale.y(share(one)), 5.0, 4.0) for one in points]
+    along = [spot for curve in place.curves for spot in _along([(scale.x(one.time), scale.y(share(one))) for one in curve.points if math.isfinite(share(one))])]
     wanted = [(one, one.mark, "number") for one in front if one.mark]
     ends = [(curve.points[i], short(float(curve.points[i].settings[curve.dial])), "value") for curve in place.curves for i in (0, -1)]
     slow = place.slow
@@ -180,7 +182,8 @@ def _labels(
             continue
         written.add((id(one), word, kind))
         x, y, half = scale.x(one.time), scale.y(share(one)), FONT * len(word) / 2 + 1
-        spot = _free(x, y, half, taken, (10, 14, 19, 25, 33) + ((42, 52, 63, 75, 90) if kind == "number" else ()))
+        reaches = (10, 14, 19, 25, 33)
+        spot = _free(x, y, half, taken + along, reaches) or (_free(x, y, half, taken, (*reaches, 42, 52, 63, 75, 90)) if kind == "number" else None)
         if spot is None:
             continue
         dx, dy = spot
@@ -190,6 +193,15 @@ def _labels(
         paint = f' style="{_paint(looks[one.id][0])}"' if kind == "value" else ""
         made.append(f'<text class="{kind}"{paint} x="{x + dx:.1f}" y="{y + dy + 4:.1f}">{word}</text>')
     return made
+
+
+def _along(way: Sequence[tuple[float, float]]) -> list[tuple[float, float, float, float]]:
+    """Returns spots on a polyline, 6 apart."""
+    found = []
+    for (x0, y0), (x1, y1) in zip(way, way[1:]):
+        steps = math.ceil(math.hypot(x1 - x0, y1 - y0) / 6) or 1
+        found += [(x0 + (x1 - x0) * i / steps, y0 + (y1 - y0) * i / steps, 1.0, 0.0) for i in range(1, steps)]
+    return found
 
 
 def _free(

@@ -104,7 +104,7 @@ def write(
     unique = study.runs.drop_duplicates("contestant")
     all_looks = looks(zip(unique["contestant"], unique["id"], unique["family"]))
     cells = advice.cells(study)
-    situations = advice.situations(study, cells)
+    situations = advice.situations(cells)
     errors = time_error_panels.shown(time_error.places(study))
     known = summary.paper(claims, folder)
     sentences = summary.sentences(study, situations, errors, known)

@@ -176,7 +176,7 @@ class TestTimeError(unittest.TestCase):
         self.assertRegex(says["missed"], r"^2 of 3 approximate contestants are faster than refit, .*they miss 0\.50\s% \(b\) to 50\s% \(a\)\.$")
         self.assertRegex(says["false"], r"^1 of 3 .* at most 2\.0\s% of what they report \(a\); the other 2 report none\.$")
         self.assertRegex(says["depth"], r"less than 1\s% of the pairs miss none deeper than 0\.25 edge lengths \(b\); the deepest .* 0\.25")
-        self.assertRegex(says["first"], r"^2 of the 2 that miss a pair .* first ten of \d+ frames; the last to begin is . *\(?.*, at frame 8\.$")
+        self.assertRegex(says["first"], r"^2 of the 2 that miss a pair begin within ten frames .*\(frame 8 of \d+\); the last to begin is .*, at frame 8\.$")
         place = self.place([exact("refit", 0.5), wrong("a", 1.0, 500)])
         self.assertIn("None of 1 approximate contestant is faster than refit", time_error.finding(place, "missed"))
         self.assertIn("reports a false pair", time_error.finding(place, "false"))
