@@ -123,7 +123,7 @@ class TestGuide(unittest.TestCase):
         page = (root / "analysis" / "guides" / "choosing.md").read_text(encoding="utf-8")
         kept = cells_file.read(root / "analysis" / "reference" / cells_file.FILE)
         self.assertEqual(cells_file.inserted(page, cells_file.table(kept), "choosing.md"), page)
-        self.assertLessEqual({advice.PAIRS, advice.SELF, advice.RAYS}, {cell.asks for cell in kept.cells})
+        self.assertLessEqual({advice.PAIRS, advice.SELF}, {cell.asks for cell in kept.cells})
 
     def test_the_file_of_cells_gives_the_same_advice(self) -> None:
         lines = [line("refit", 2.0, "a"), other("join", 1.0, "a", foresight="next_keyframe"), line("refit", 1.0, "b"), other("join", 1.3, "b")]
