@@ -79,7 +79,6 @@ triangle in a leaf. Time is update and query together, of the median of several 
 #: The links that lead on from the first page: page, question, answer.
 WAYS = [
     ("analysis/guides/choosing.html", "What do I take?", "Which strategy suits your motion, and what it costs."),
-    ("errors.html", "What does exactness cost?", "Time against error: what fast wrong answers miss."),
     ("claims.html", "Does the paper hold?", "Each claim of 2006, measured, with its verdict."),
     ("lessons.html", "How does it work?", "A course of nine lessons, with the lab inside."),
 ]
