@@ -250,10 +250,10 @@ def finding(place: Place, name: str) -> str:
             return f"None of {of} is faster than {line.name}, which is exact and knows nothing of the future."
         best, worst = (end(quick, key=lambda one: one.missed) for end in (min, max))
         span = "none of them misses a pair" if worst.missed == 0 else f"they miss {measure.says(best) if best.missed else 'none'} ({best.name}) to {measure.says(worst)} ({worst.name})"
-        return f"{len(quick)} of {of} are faster than {line.name}, which is exact and knows nothing of the future; {span}."
+        return f"{len(quick)} of {of} {'is' if len(quick) == 1 else 'are'} faster than {line.name}, which is exact and knows nothing of the future; {span}."
     if name == "false":
         others = f"; the other {len(wrong) - len(errs)} report none" if len(errs) < len(wrong) else ""
-        return f"{len(errs)} of {of} report false pairs, at most {measure.says(most)} of what they report ({most.name}){others}."
+        return f"{len(errs)} of {of} report{'s' * (len(errs) == 1)} false pairs, at most {measure.says(most)} of what they report ({most.name}){others}."
     few = [one for one in errs if one.missed < FEW]
     if name == "depth":
         deepest = max(few, key=measure.of, default=None)

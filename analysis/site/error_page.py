@@ -18,7 +18,7 @@ COLOURS = """<style>
 .errors .error-table :is(td, th) { padding: .2rem .5rem .2rem 0; text-align: left; vertical-align: top; border-bottom: 1px solid var(--line); }
 .errors .error-table .n { text-align: right; padding-left: .4rem; }
 .errors .tag { font-size: .75rem; color: var(--accent); }
-.errors figcaption.title { font-weight: 700; }
+.errors figcaption.title { display: none; }  /* the heading says it */
 .errors summary { cursor: pointer; }
 body[data-theme="dark"] .errors [style] { --paint: var(--d); }
 body[data-theme="light"] .errors [style] { --paint: var(--l); }

@@ -174,7 +174,7 @@ class TestTimeError(unittest.TestCase):
         (place,) = time_error.places(self.study(lines))
         says = {name: time_error.finding(place, name) for name in time_error.MEASURES}
         self.assertRegex(says["missed"], r"^2 of 3 approximate contestants are faster than refit, .*they miss 0\.50\s% \(b\) to 50\s% \(a\)\.$")
-        self.assertRegex(says["false"], r"^1 of 3 .* at most 2\.0\s% of what they report \(a\); the other 2 report none\.$")
+        self.assertRegex(says["false"], r"^1 of 3 approximate contestants reports false pairs, at most 2\.0\s% of what they report \(a\); the other 2 report none\.$")
         self.assertRegex(says["depth"], r"less than 1\s% of the pairs miss none deeper than 0\.25 edge lengths \(b\); the deepest .* 0\.25")
         self.assertRegex(says["first"], r"^2 of the 2 that miss a pair begin within ten frames .*\(frame 8 of \d+\); the last to begin is .*, at frame 8\.$")
         place = self.place([exact("refit", 0.5), wrong("a", 1.0, 500)])
@@ -202,7 +202,7 @@ class TestTimeError(unittest.TestCase):
             folder = synthetic.write(Path(name), [exact("refit", 2.0), wrong("a", 1.0, 5)])
             self.assertEqual(time_error_file.main([str(folder), "--write", str(folder / "errors.json")]), 0)
             self.assertEqual(len(time_error_file.read(folder / "errors.json")), 1)
-            self.assertIn("1 of 1 approximate contestant", out.getvalue().replace("\u00a0", " "))
+            self.assertIn("1 of 1 approximate contestant is faster", out.getvalue().replace("\u00a0", " "))
         with tempfile.TemporaryDirectory(prefix="kbvh-analysis-") as name, contextlib.redirect_stderr(io.StringIO()) as out:
             self.assertEqual(time_error_file.main([str(synthetic.write(Path(name), [exact("refit", 2.0), exact("tree", 1.0)]))]), 2)
             self.assertIn("wrongly", out.getvalue())
