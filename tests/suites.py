@@ -1,14 +1,15 @@
 #!/usr/bin/env python3
 """Runs the registered tests with one process for all cases of a suite, where CTest starts one for each case.
 
-usage: suites.py BUILD [CTEST OPTION...]
+usage: suites.py [--shuffle SEED] BUILD [CTEST OPTION...]
 
 The options choose tests as ctest does (-L, -LE, -R, -E). Suites run side by side, those first that took longest in this
-build before. A case that fails is printed with what its executable said. Exit code 1 if any failed.
+build before; with --shuffle in a random order, and so do the cases of each. A case that fails is printed with what its executable said. Exit code 1 if any failed.
 """
 import concurrent.futures
 import json
 import os
+import random
 import re
 import subprocess
 import sys
@@ -75,13 +76,18 @@ def main():
     if len(sys.argv) < 2:
         sys.exit(__doc__)
     begin = time.monotonic()
-    past = os.path.join(sys.argv[1], "suite_times.json")
+    arguments = sys.argv[1:]
+    seed = int(arguments[1]) if arguments[0] == "--shuffle" else None
+    build, *options = arguments if seed is None else arguments[2:]
+    past = os.path.join(build, "suite_times.json")
     before = {}
     if os.path.exists(past):
         with open(past) as file:
             before = json.load(file)
-    work = sorted(batches(registered(sys.argv[1], sys.argv[2:])),
-                  key=lambda batch: (-before.get(batch[0], 0), -batch[1]))
+    work = sorted(batches(registered(build, options)), key=lambda batch: (-before.get(batch[0], 0), -batch[1]))
+    if seed is not None:
+        random.Random(seed).shuffle(work)
+        os.environ.update(GTEST_SHUFFLE="1", GTEST_RANDOM_SEED=str(seed % 99999 + 1))
     if not work:
         sys.exit("no test is chosen")
     failed, cases, times, left_out = [], 0, [], []

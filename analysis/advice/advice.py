@@ -7,24 +7,22 @@ frames from one keyframe to the next, and the question asked. **The rule:** of t
 were measured in at least half of the situation's cells, take the one with the largest geometric mean of its speeds; a cell in which it
 was not measured counts as its slowest. The explorer uses the same rule (explorer/src/advice.js), and a test compares the two.
 
-usage: advice.py RESULTS_DIR [--write PAGE]     prints the table, or puts it between `<!-- advice -->` and `<!-- /advice -->`
+The same cells are kept with the project (`cells_file`): the guide's table comes from them, and a report names them for questions that
+its own study did not ask.
 """
 
 from __future__ import annotations
 
-import argparse
 import math
-import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, Optional
 
 import pandas as pd
 
 from ratios import profiles, ratios
-from results import clip_times, files, text
-from results.load import ResultError, Study, load
+from results import clip_times, text
+from results.load import Study
 
 #: What a strategy may know about motion, from least to most.
 FORESIGHT: dict[str, tuple[str, ...]] = {
@@ -41,13 +39,13 @@ FRAMES: dict[str, tuple[float, float]] = {
 }
 
 #: What is asked of a cell (`asked`), in the order of pages.
-PAIRS, SELF = "pairs of two bodies", "pairs within a body, too"
+PAIRS, SELF, RAYS = "pairs of two bodies", "pairs within a body, too", "rays"
 
 
 def asked(row: Any) -> str:
     """Returns what a cell asks for, from the record of one of its contestants."""
     if row["rays"]:
-        return "rays"
+        return RAYS
     if row["within"]:
         return "primitives near points"
     if row["continuous"]:
@@ -65,6 +63,19 @@ def frames_of(l: float) -> str:
     return next(name for name, (low, high) in FRAMES.items() if low <= l < high)
 
 
+@dataclass(frozen=True)
+class Facts:
+    """What the rule has to know of a strategy."""
+
+    title: str
+    foresight: str
+    baseline: bool
+
+
+#: Ends of the interval of a ratio, or of the range of few rounds, and whether it is an interval.
+Span = tuple[float, float, bool]
+
+
 @dataclass
 class Cell:
     """One scene at one size, scalar and l."""
@@ -72,11 +83,12 @@ class Cell:
     title: str
     asks: str
     frames: str
-    refit: int  #: run of the best refit
-    runs: dict[str, int]  #: by strategy: its fastest setting
+    best_refit: str  #: the strategy whose fastest setting is the best refit
     speeds: dict[str, float]  #: by strategy: times as fast as the best refit
-    contestants: dict[str, str]
-    row: pd.Series  #: of the best refit
+    times: dict[str, float]  #: by strategy: ms per frame of the whole clip, positions included
+    doubtful: frozenset[str]  #: strategies whose ratio was measured on a disturbed machine
+    facts: dict[str, Facts]
+    span: Callable[[str], Optional[Span]]  #: of a strategy's ratio
 
     def share(self, id: str) -> float:
         """Returns the time of the fastest over that of a strategy."""
@@ -86,6 +98,16 @@ class Cell:
         """Returns the fastest of some strategies; None if none of them was measured."""
         known = [id for id in ids if id in self.speeds]
         return max(known, key=lambda id: (self.speeds[id], id)) if known else None
+
+
+@dataclass
+class MeasuredCell(Cell):
+    """A cell of a study."""
+
+    refit: int  #: run of the best refit
+    runs: dict[str, int]  #: by strategy: its fastest setting
+    contestants: dict[str, str]
+    row: pd.Series  #: of the best refit
 
 
 @dataclass
@@ -104,6 +126,7 @@ class Advice:
     best_in: int  #: of a refit: cells in which it is the best refit
     disturbed: bool = False
     is_interval: bool = False  #: in a single cell: of at least five rounds
+    times: tuple[float, float] = (math.nan, math.nan)  #: ms per frame in the cell with the shortest, and the longest
 
     @property
     def says(self) -> str:
@@ -122,6 +145,13 @@ class Advice:
             of = ("95\u00a0% interval " if self.is_interval else "range of its rounds ") + span
         doubt = "; the machine was disturbed" if self.disturbed else ""
         return f"{text.factor(self.speed)} times as fast as the best refit ({of}{missing}{doubt})"
+
+
+    @property
+    def costs(self) -> str:
+        """Writes the times out, as in "0.12 to 0.64 ms a frame"."""
+        low, high = (text.milliseconds(one) for one in self.times)
+        return f"{low} ms a frame" if low == high else f"{low} to {high} ms a frame"
 
 
 @dataclass
@@ -146,24 +176,39 @@ class Record:
     worst_cell: str = ""
 
 
-def cells(study: Study) -> list[Cell]:
+def cells(study: Study) -> list[MeasuredCell]:
     """Returns the cells of a study, in the order of its groups."""
     found = []
     timed = profiles.contestants(study.timed)
+    unique = study.runs.drop_duplicates("id")
+    facts = {str(one.id): Facts(str(one.title), str(one.foresight), bool(one.baseline)) for one in unique[["id", "title", "foresight", "baseline"]].itertuples()}
     for _, rows in timed.groupby(["group", "commit", "dirty"], sort=False):
         refit = ratios.best_refit(study, rows)
         best = rows.sort_values(["total_motion", "run"]).drop_duplicates("id")
         if refit is None or len(best) < 2:
             continue
         row = rows[rows["run"] == refit].iloc[0]
-        speeds = {str(one.id): _speed(study, int(one.run), refit) for one in best[["id", "run"]].itertuples()}
+        runs = dict(zip(map(str, best["id"]), map(int, best["run"])))
         found.append(
-            Cell(
-                _title(row), asked(row), frames_of(float(row["l"])), refit, dict(zip(best["id"], map(int, best["run"]))), speeds,
-                dict(zip(best["id"], best["contestant"])), row,
+            MeasuredCell(
+                title=_title(row), asks=asked(row), frames=frames_of(float(row["l"])), refit=refit, runs=runs, row=row,
+                best_refit=next((id for id, run in runs.items() if run == refit), ""), contestants=dict(zip(best["id"], best["contestant"])),
+                speeds={id: _speed(study, run, refit) for id, run in runs.items()}, times=dict(zip(map(str, best["id"]), map(float, best["total_motion"]))),
+                doubtful=frozenset(id for id, run in runs.items() if ratios.is_disturbed(study, run, refit)), facts=facts,
+                span=_spans(study, runs, refit),
             )  # fmt: skip
         )
     return found
+
+
+def _spans(study: Study, runs: dict[str, int], refit: int) -> Callable[[str], Optional[Span]]:
+    """Returns a function that resamples the ratio of a strategy: too slow to do for all."""
+
+    def span(id: str) -> Optional[Span]:
+        found = ratios.ratio(study, runs[id], refit, "with_motion")
+        return (found.low, found.high, found.is_interval) if found else None
+
+    return span
 
 
 def _speed(study: Study, run: int, refit: int) -> float:
@@ -174,32 +219,30 @@ def _speed(study: Study, run: int, refit: int) -> float:
     return top / bottom if bottom > 0 else math.nan
 
 
-def situations(study: Study, every: Optional[Sequence[Cell]] = None) -> list[Situation]:
-    """Returns the advice for each situation that the study has cells of: pairs of two bodies first."""
-    every = cells(study) if every is None else every
+def situations(every: Sequence[Cell]) -> list[Situation]:
+    """Returns the advice for each situation that there are cells of: pairs of two bodies first."""
     kinds = list(dict.fromkeys([PAIRS, SELF, *(cell.asks for cell in every)]))
     found = []
     for asks in kinds:
         for frames in FRAMES:
             own = [cell for cell in every if (cell.asks, cell.frames) == (asks, frames)]
             if own:
-                found.append(Situation(asks, frames, len(own), [(known, advise(study, own, known)) for known in FORESIGHT]))
+                found.append(Situation(asks, frames, len(own), [(known, advise(own, known)) for known in FORESIGHT]))
     return found
 
 
-def allowed(study: Study, known: str) -> list[str]:
-    """Returns the strategies that need to know no more than `known`, a key of FORESIGHT."""
-    unique = study.runs.drop_duplicates("id")
-    return sorted(unique.loc[unique["foresight"].isin(FORESIGHT[known]), "id"])
+def allowed(every: Sequence[Cell], known: str) -> list[str]:
+    """Returns the strategies of some cells that need to know no more than `known`, a key of FORESIGHT."""
+    return sorted({id for cell in every for id in cell.speeds if cell.facts[id].foresight in FORESIGHT[known]})
 
 
-def advise(study: Study, own: Sequence[Cell], known: str) -> Optional[Advice]:
+def advise(own: Sequence[Cell], known: str) -> Optional[Advice]:
     """Applies the rule to the cells of one situation; None if no strategy was measured in half of them."""
     best: Optional[str] = None
     most = -math.inf
-    for id in allowed(study, known):
+    for id in allowed(own, known):
         speeds = [cell.speeds[id] for cell in own if id in cell.speeds]
-        if not speeds or 2 * len(speeds) < len(own):
+        if 2 * len(speeds) < len(own):
             continue
         mean = geometric_mean(speeds + [min(speeds)] * (len(own) - len(speeds)))
         if mean > most:
@@ -208,16 +251,15 @@ def advise(study: Study, own: Sequence[Cell], known: str) -> Optional[Advice]:
         return None
     measured = [cell for cell in own if best in cell.speeds]
     worst = min(measured, key=lambda cell: cell.speeds[best])
-    first = study.runs[study.runs["id"] == best].iloc[0]
     low, high = worst.speeds[best], max(cell.speeds[best] for cell in measured)
     is_interval = False
     if len(own) == 1:
-        found = ratios.ratio(study, own[0].runs[best], own[0].refit, "with_motion")
-        low, high, is_interval = (found.low, found.high, found.is_interval) if found else (low, high, False)
-    disturbed = any(ratios.is_disturbed(study, cell.runs[best], cell.refit) for cell in measured)
+        low, high, is_interval = own[0].span(best) or (low, high, False)
+    times = [cell.times[best] for cell in measured]
+    facts = measured[0].facts[best]
     return Advice(
-        best, str(first["title"]), bool(first["baseline"]), most, low, high, len(own), len(measured), worst.title,
-        sum(cell.refit == cell.runs[best] for cell in measured), disturbed, is_interval,
+        best, facts.title, facts.baseline, most, low, high, len(own), len(measured), worst.title,
+        sum(cell.best_refit == best for cell in measured), any(best in cell.doubtful for cell in measured), is_interval, (min(times), max(times)),
     )  # fmt: skip
 
 
@@ -257,49 +299,7 @@ def sentence(one: Situation) -> str:
     last = ""
     for known, best in one.advice:
         if best is not None and best.id != last:
-            parts.append(f"{best.title} {'if' if parts else 'where'} {known}: {best.says}")
+            parts.append(f"{best.title} {'if' if parts else 'where'} {known}: {best.says}, at {best.costs}")
             last = best.id
     asks = {PAIRS: "", SELF: " and pairs within a body"}.get(one.asks, f" and {one.asks}")
     return f"With {one.frames}{asks}, take {'; '.join(parts)}." if parts else f"With {one.frames}{asks}, no strategy was measured in half of the cells."
-
-
-def markdown(study: Study) -> str:
-    """Returns the advice as a table of Markdown."""
-    lines = ["| situation | cells | " + " | ".join(FORESIGHT) + " |", "|---|---|" + "---|" * len(FORESIGHT)]
-    for one in situations(study):
-        row = [f"{one.asks}, {one.frames}", str(one.cells)]
-        last = ""
-        for _, best in one.advice:
-            row.append(text.MISSING if best is None else "the same" if best.id == last else f"{best.title} (`{best.id}`): {best.says}")
-            last = best.id if best else ""
-        lines.append("| " + " | ".join(row) + " |")
-    return "\n".join(lines) + "\n"
-
-
-BEGIN, END = "<!-- advice -->\n", "<!-- /advice -->\n"
-
-
-def inserted(page: str, table: str, place: str) -> str:
-    """Returns a page with its table replaced. Raises ResultError for a page without a place for it."""
-    if page.count(BEGIN) != 1 or page.count(END) != 1 or page.index(END) < page.index(BEGIN):
-        raise ResultError(f"{place} should have the lines {BEGIN.strip()} and {END.strip()} once, in this order.")
-    return page.split(BEGIN)[0] + BEGIN + table + END + page.split(END)[1]
-
-
-def main(arguments: Optional[list[str]] = None) -> int:
-    """Runs the command; returns the exit code: 0, or 2 for unusable input."""
-    parser = argparse.ArgumentParser(prog="advice.py", description="Prints which strategy the results recommend for what.")
-    parser.add_argument("folder", metavar="RESULTS_DIR", type=Path, help="folder with results.jsonl")
-    parser.add_argument("--write", metavar="PAGE", type=Path, help="insert the table into this page")
-    options = parser.parse_args(arguments)
-
-    def work() -> int:
-        table = markdown(load(options.folder))
-        if options.write:
-            page = options.write.read_text(encoding="utf-8")
-            files.write_whole(options.write, inserted(page, table, str(options.write)))
-        else:
-            print(table, end="")
-        return 0
-
-    return files.run_command("advice", (ResultError,), work)

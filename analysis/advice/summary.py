@@ -9,11 +9,11 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Optional
 
-from advice import advice
-from advice.advice import Advice, Cell, Situation
+from advice import advice, cells_file
+from advice.advice import Advice, MeasuredCell, Situation
 from claims import claims as paper_claims
 from claims.claims import CONDITION, FAILS, HOLDS, OPEN, Claims
-from figures import time_error
+from figures import time_error_file, time_error_panels
 from ratios import ratios
 from results import text
 from results.load import OLD_SCHEMA, Study
@@ -148,21 +148,43 @@ class Sentence:
     place: str
 
 
-def sentences(study: Study, found: Sequence[Situation], errors: Sequence[time_error.Shown], known: Paper) -> list[Sentence]:
+def on_others(found: Sequence[Situation], reference: Path = REFERENCE) -> str:
+    """Answers the questions other than pairs of two bodies: by this study, else by the cells that come with the project."""
+    others: dict[str, Situation] = {one.asks: one for one in found if one.asks != advice.PAIRS}  # the one with the most frames a keyframe
+    named = [others[asks] for asks in dict.fromkeys([advice.SELF, advice.RAYS, *others]) if asks in others][:2]
+    words = [advice.sentence(one) for one in named]
+    absent = [asks for asks in (advice.SELF, advice.RAYS) if asks not in others]
+    if absent:
+        file = reference / cells_file.FILE
+        kept = cells_file.read(file) if file.exists() else None
+        known = {one.asks: one for one in advice.situations(kept.cells)} if kept else {}
+        names = {advice.SELF: "pairs within a body", advice.RAYS: "rays"}
+        words.append(f"{text.listing([names[asks] for asks in absent]).capitalize()} were not asked for in this study.")
+        told = [advice.sentence(known[asks]) for asks in absent if asks in known]
+        if kept and told:
+            words.append(f"By measurements that come with the project ({kept.told.replace('`', '')}): {' '.join(told)}")
+    return " ".join(words)
+
+
+def on_errors(errors: Sequence[time_error_panels.Shown], reference: Path = REFERENCE) -> str:
+    """Says what exactness costs: by this study, else by the figures that come with the project."""
+    if errors:
+        return errors[0].sentences[0]
+    says = "No contestant of this study answers wrongly, so it does not say what exactness costs."
+    file = reference / time_error_file.FILE
+    kept = time_error_file.read(file) if file.exists() else []
+    return f"{says} Elsewhere: {kept[0].sentences[0]} {kept[0].measured}" if kept else says
+
+
+def sentences(study: Study, found: Sequence[Situation], errors: Sequence[time_error_panels.Shown], known: Paper) -> list[Sentence]:
     """Returns the five lines of the top; four in a study of other questions than pairs of two bodies."""
     pairs = [one for one in found if one.asks == advice.PAIRS]
-    others: dict[str, Situation] = {one.asks: one for one in found if one.asks != advice.PAIRS}  # the one with the most frames a keyframe
     said = []
     if pairs:
         ends = [pairs[-1], pairs[0]] if len(pairs) > 1 else pairs
         said.append(Sentence("What to take", " ".join(advice.sentence(one) for one in ends), "glance"))
-    named = [others[asks] for asks in dict.fromkeys([advice.SELF, "rays", *others]) if asks in others][:2]
-    words = [advice.sentence(one) for one in named]
-    absent = [name for asks, name in ((advice.SELF, "pairs within a body"), ("rays", "rays")) if asks not in others]
-    words += [f"{text.listing(absent).capitalize()} were not asked for in this study."] if absent else []
-    said.append(Sentence("Other questions", " ".join(words), "glance"))
-    exactness = errors[0].sentences[0] if errors else "No contestant of this study answers wrongly, so it does not say what exactness costs."
-    said.append(Sentence("Time against error", exactness, "errors" if errors else "limits"))
+    said.append(Sentence("Other questions", on_others(found), "glance"))
+    said.append(Sentence("Time against error", on_errors(errors), "errors" if errors else "limits"))
     said.append(Sentence("The paper", on_the_paper(known), "claims"))
     said.append(Sentence("This run", on_disturbance(study), "limits"))
     return said
@@ -238,12 +260,12 @@ class Line:
     by_knowledge: list[Optional[Fastest]]  #: in the order of FORESIGHT; None where less knowledge does as well
 
 
-def lines(study: Study, every: Sequence[Cell]) -> list[Line]:
+def lines(study: Study, every: Sequence[MeasuredCell]) -> list[Line]:
     """Returns a line for each cell, in the order of the tables: what is the fastest in it, by what is known, in ms and over the best refit."""
     order = {rows["group"].iloc[0]: place for place, rows in enumerate(study.groups())}
     total = dict(zip(map(int, study.runs["run"]), study.runs["total_motion"]))
     titles = dict(zip(study.runs["id"], study.runs["title"]))
-    allowed = {known: advice.allowed(study, known) for known in advice.FORESIGHT}
+    allowed = {known: advice.allowed(every, known) for known in advice.FORESIGHT}
     found = []
     for cell in sorted(every, key=lambda cell: order[cell.row["group"]]):
         by_knowledge: list[Optional[Fastest]] = []

@@ -1,7 +1,6 @@
 """Time against error: what approximate contestants miss and falsely report, against their time and that of exact ones.
 
-The figure is inline SVG in small panels: its colours are variables of the page, and two panels stand side by side or, on a phone, one
-below the other. Data and drawing are apart: `places` finds the points, curves and fronts, `panel` draws them.
+Finds points, curves, fronts and sentences; `time_error_panels` draws them, `time_error_file` keeps them for pages without the results.
 """
 
 from __future__ import annotations
@@ -10,14 +9,10 @@ import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from html import escape
 from typing import Any, Optional
 
 import pandas as pd
-from markupsafe import Markup
 
-from claims.claim_pictures import ticks
-from figures.colours import Look, on_dark, symbol
 from ratios import ratios
 from results import text
 from results.load import Study
@@ -26,10 +21,6 @@ from results.load import Study
 FEW = 0.01
 #: Contestants that take more than this many times the fastest exact one are drawn at the right edge: the left part would shrink.
 SLOW = 8.0
-#: Colours (Okabe and Ito's, and more) and markers of the approximate strategies, in the order of their ids.
-COLOURS = ("#D55E00", "#009E73", "#AA4499", "#E69F00", "#56B4E9", "#8C7A00", "#CC79A7", "#A8324A", "#5D4A9C", "#117733")
-MARKERS = ("o", "s", "^", "D", "v", "p", "<", "h", ">", "d")
-EXACT = "#0072B2"
 
 
 @dataclass
@@ -53,6 +44,40 @@ class Point:
     mark: str = ""  #: its number, if it is on a front
 
 
+@dataclass(frozen=True)
+class Measure:
+    """A kind of error as an axis, on which 0 is no error."""
+
+    title: str
+    of: Callable[[Point], float]  #: NaN where the record does not know
+    tick: Callable[[float], str]
+    none: str  #: at the place of 0
+    says: Callable[[Point], str]
+
+
+def _depth(one: Point) -> float:
+    return one.depth if one.missed > 0 else 0.0
+
+
+def _begin(one: Point) -> float:
+    """Returns 1 for a miss in the first frame, 1/n for one in the n-th."""
+    return 0.0 if one.missed == 0 else math.nan if one.first is None else 1 / (one.first + 1)
+
+
+#: The errors that have a panel. The first two are errors of the answer as a whole; the others tell how bad the missed pairs are.
+MEASURES: dict[str, Measure] = {
+    "missed": Measure("True pairs missed", lambda one: one.missed, text.percent_tick, "0", lambda one: text.percent(one.missed)),
+    "false": Measure("Reported pairs that are false", lambda one: one.false, text.percent_tick, "0", lambda one: text.percent(one.false)),
+    "depth": Measure(
+        "Deepest missed pair, in mean edge lengths", _depth, text.tick, "0", lambda one: f"{text.significant(_depth(one), 2)} edge lengths"
+    ),
+    "first": Measure(
+        "Frame of the first missed pair", _begin, lambda value: text.count(round(1 / value)), "never",
+        lambda one: "never" if one.missed == 0 else text.MISSING if one.first is None else f"frame {text.count(one.first + 1)}",
+    ),
+}  # fmt: skip
+
+
 @dataclass
 class Curve:
     """The points of a strategy that differ in one number only, in its order."""
@@ -70,8 +95,10 @@ class Place:
     anchor: str
     points: list[Point]  #: by time
     curves: list[Curve]
-    fronts: dict[str, list[Point]]  #: points that no other dominates in time and error, by column; the fastest first
-    named: list[Point] = field(default_factory=list)  #: all points on a front, by time
+    fronts: dict[str, list[Point]]  #: points that no other dominates in time and error, by measure; the fastest first
+    sentences: list[str] = field(default_factory=list)  #: what exactness costs
+    measured: str = ""  #: when, by which commit and on which machine
+    named: list[Point] = field(default_factory=list)  #: all points on the fronts of missed and of false pairs, by time
 
     @property
     def slow(self) -> list[Point]:
@@ -83,27 +110,53 @@ class Place:
     def fastest_exact(self) -> Optional[Point]:
         return next((point for point in self.points if point.exact), None)
 
+    @property
+    def unknowing(self) -> Optional[Point]:
+        """Returns the fastest exact one that knows nothing of the future."""
+        return next((point for point in self.points if point.exact and point.foresight == "none"), None)
+
 
 def places(study: Study) -> list[Place]:
-    """Returns the tables in which a contestant missed or added pairs; float before double."""
+    """Returns the tables in which a contestant missed or added pairs, with their sentences; float before double."""
     found = []
     for rows in study.groups():
         timed = ratios.without_oracles(rows[(rows["refused"] == "") & (rows["total_motion"] > 0) & (rows["pairs"] > 0)])
         if not ((timed["guarantee"] == "approximate") & (timed["missed"] + timed["extra"] > 0)).any():
             continue
         first = timed.iloc[0]
-        points = sorted((_point(row) for _, row in timed.iterrows()), key=lambda one: (one.time, one.contestant))
         title = f"{first['scene']}, {text.size(first['primitives'])} primitives, {first['scalar']}, l = {first['l']:g}"
-        fronts = {}
-        for column in ("missed", "false"):
-            front = ratios.pareto_front([(getattr(one, column), one.time) for one in points])
-            fronts[column] = sorted((points[i] for i in front), key=lambda one: one.time)
-        place = Place(title, f"error-{len(found) + 1}", points, _curves(points), fronts)
-        place.named = [one for one in points if any(one is other for front in fronts.values() for other in front)]
-        for number, one in enumerate(place.named, start=1):
-            one.mark = str(number)
+        place = place_of(title, [_point(row) for _, row in timed.iterrows()], len(found))
+        place.sentences = sentences(study, place)
+        place.measured = _measured(timed)
         found.append(place)
     return found
+
+
+def place_of(title: str, points: Sequence[Point], number: int) -> Place:
+    """Finds curves and fronts of some points, and numbers those on the fronts; `number` is that of the place on its page, from 0."""
+    points = sorted(points, key=lambda one: (one.time, one.contestant))
+    fronts = {}
+    for name, measure in MEASURES.items():
+        front = ratios.pareto_front([(measure.of(one), one.time) for one in points])
+        fronts[name] = sorted((points[i] for i in front), key=lambda one: one.time)
+    place = Place(title, f"error-{number + 1}", points, _curves(points), fronts)
+    place.named = [one for one in points if any(one is other for name in ("missed", "false") for other in fronts[name])]
+    for mark, one in enumerate(place.named, start=1):
+        one.mark = str(mark)
+    return place
+
+
+def _measured(rows: pd.DataFrame) -> str:
+    """Says when a table was measured, by what, where, in how many rounds, and how disturbed."""
+    days = sorted({str(when)[:10] for when in rows["when"] if when})
+    when = "on a day that is not recorded" if not days else days[0] if days[0] == days[-1] else f"{days[0]} to {days[-1]}"
+    commits = text.listing([f"{commit[:8]}{' with local changes' if dirty else ''}" for commit, dirty in sorted(set(zip(rows["commit"], rows["dirty"])))])
+    machines = text.listing([f"{cpu} ({kernels} kernels)" for cpu, kernels in sorted(set(zip(rows["cpu"], rows["kernels"])))])
+    rounds = sorted({int(one) for one in rows["repetitions"]})
+    span = f"{rounds[0]} to {rounds[-1]} rounds" if rounds[0] < rounds[-1] else text.plural(rounds[0], "round")
+    disturbed = int((rows["disturbed"] != "").sum())
+    doubt = f"the machine was disturbed while {disturbed} of them were timed" if disturbed else "the machine was quiet"
+    return f"Measured {when} by commit {commits} on {machines}: {text.plural(len(rows), 'contestant')}, {span}; {doubt}."
 
 
 def _point(row: pd.Series) -> Point:
@@ -111,7 +164,7 @@ def _point(row: pd.Series) -> Point:
     builder = {f"builder {name}": str(value) for name, value in (row["builder"] or {}).items()}
     settings = {**{name: str(value) for name, value in row["params"].items()}, **builder}
     told = ", ".join(str(row["tag"]).removeprefix(str(row["id"])).strip(" []").split(" ")).replace("_", " ").replace("=", "\u00a0")
-    told = re.sub(r"\d{7,}", lambda found: _short(float(found[0])), told)
+    told = re.sub(r"\d{7,}", lambda found: short(float(found[0])), told)
     return Point(
         contestant=row["contestant"], id=row["id"], name=f"{row['title']} ({told})" if told else row["title"], title=row["title"],
         exact=row["guarantee"] != "approximate", foresight=row["foresight"], time=float(row["total_motion"]),
@@ -176,212 +229,43 @@ def sentences(study: Study, place: Place) -> list[str]:
     return list(told.values())
 
 
-def series(found: Sequence[Place]) -> dict[str, tuple[str, str]]:
-    """Returns colour and marker of each approximate strategy of these places."""
-    ids = sorted({one.id for place in found for one in place.points if not one.exact})
-    return {one: (COLOURS[i % len(COLOURS)], MARKERS[i % len(MARKERS)]) for i, one in enumerate(ids)}
+def finding(place: Place, name: str) -> str:
+    """Returns one sentence on what the panel of a measure shows."""
+    measure = MEASURES[name]
+    wrong = [one for one in place.points if not one.exact]
+    known = [one for one in wrong if math.isfinite(measure.of(one))]
+    if len(known) < len(wrong):
+        return "Records of this age do not know it."
+    errs = [one for one in wrong if measure.of(one) > 0]
+    of = text.plural(len(wrong), "approximate contestant")
+    least, most = (end(errs, key=measure.of, default=None) for end in (min, max))
+    if least is None or most is None:
+        return {"false": f"None of {of} reports a false pair: their errors are missing pairs."}.get(name, f"None of {of} misses a pair.")
+    if name == "missed":
+        line = place.unknowing or place.fastest_exact
+        if line is None:
+            return f"{len(errs)} of {of} miss pairs: {measure.says(least)} ({least.name}) to {measure.says(most)} ({most.name})."
+        quick = [one for one in wrong if one.time < line.time]
+        if not quick:
+            return f"None of {of} is faster than {line.name}, which is exact and knows nothing of the future."
+        best, worst = (end(quick, key=lambda one: one.missed) for end in (min, max))
+        span = "none of them misses a pair" if worst.missed == 0 else f"they miss {measure.says(best) if best.missed else 'none'} ({best.name}) to {measure.says(worst)} ({worst.name})"
+        return f"{len(quick)} of {of} {'is' if len(quick) == 1 else 'are'} faster than {line.name}, which is exact and knows nothing of the future; {span}."
+    if name == "false":
+        others = f"; the other {len(wrong) - len(errs)} report none" if len(errs) < len(wrong) else ""
+        return f"{len(errs)} of {of} report{'s' * (len(errs) == 1)} false pairs, at most {measure.says(most)} of what they report ({most.name}){others}."
+    few = [one for one in errs if one.missed < FEW]
+    if name == "depth":
+        deepest = max(few, key=measure.of, default=None)
+        first = f"Contestants that miss less than 1\u00a0% of the pairs miss none deeper than {measure.says(deepest)} ({deepest.name}); " if deepest else ""
+        return f"{first}{'t' if first else 'T'}he deepest miss of all is {measure.says(most)} ({most.name})."
+    soon = [one for one in errs if one.first is not None and most.first is not None and one.first < most.first + 10]
+    return (
+        f"{len(soon)} of the {len(errs)} that miss a pair begin within ten frames of the first of them ({measure.says(most)} of {text.count(most.frames)}); "
+        f"the last to begin is {least.name}, at {measure.says(least)}."
+    )
 
 
-@dataclass(frozen=True)
-class Entry:
-    """A line of the legend."""
-
-    symbol: Markup  #: in the colours of the panels
-    name: str
-    dials: str  #: the dial that its curves turn, and its range
-
-
-def legend(place: Place, looks: dict[str, tuple[str, str]]) -> list[Entry]:
-    """Returns a line for each approximate strategy of a place, in the order of their fastest point."""
-    result = []
-    for identity in dict.fromkeys(one.id for one in place.points if not one.exact):
-        dials: dict[str, list[float]] = {}
-        for curve in place.curves:
-            if curve.id == identity:
-                dials.setdefault(curve.dial, []).extend(float(one.settings[curve.dial]) for one in curve.points)
-        told = "; ".join(f"{dial.replace('_', ' ')} {_short(min(values))} to {_short(max(values))}" for dial, values in dials.items())
-        title = next(one.title for one in place.points if one.id == identity)
-        result.append(Entry(_symbol(*looks[identity]), title, told))
-    return result
-
-
-def _symbol(colour: str, marker: str) -> Markup:
-    return Markup(f'<svg class="time-error-key" viewBox="-6.5 -6.5 13 13" aria-hidden="true">{_mark(colour, marker, 0, 0, scale=1.15)}</svg>')
-
-
-def _short(value: float) -> str:
+def short(value: float) -> str:
+    """Formats a setting, without the zeros of its power of ten."""
     return f"{value:g}".replace("e+0", "e").replace("e+", "e")
-
-
-# ---- Drawing
-
-WIDTH, HEIGHT = 420, 348
-LEFT, RIGHT, TOP, BOTTOM = 48, 10, 44, 40  #: names of the vertical lines stand above the top, where no mark is
-HEAD = 16  #: room for a label above the largest share
-STRIP = 20  #: height of the strip of exact zeros
-FONT = 6.4  #: width of a character, for labels that keep apart
-
-
-class Scale:
-    """Places of times (logarithmic) and shares (logarithmic, zero apart)."""
-
-    def __init__(self, times: Sequence[float], shares: Sequence[float]) -> None:
-        low, high = math.log10(min(times)), math.log10(max(times))
-        room = max(0.05 * (high - low), 0.04)
-        self.low, self.high = low - room, high + room
-        positive = [share for share in shares if share > 0] or [0.01, 1.0]
-        self.least = math.floor(math.log10(min(positive)) + 1e-9)
-        self.most = max(math.ceil(math.log10(max(positive)) - 1e-9), self.least + 1)
-        self.times = ticks(10**self.low, 10**self.high, 5)
-
-    def x(self, time: float) -> float:
-        """Returns the place of a time; those of slow contestants are at the edge."""
-        return LEFT + min((math.log10(time) - self.low) / (self.high - self.low), 1.0) * (WIDTH - LEFT - RIGHT)
-
-    def y(self, share: float) -> float:
-        bottom = HEIGHT - BOTTOM
-        if share <= 0:
-            return bottom - STRIP / 2
-        bottom -= STRIP + 4
-        return bottom - (math.log10(share) - self.least) / (self.most - self.least) * (bottom - TOP - HEAD)
-
-    def decades(self) -> list[float]:
-        step = math.ceil((self.most - self.least) / 6)
-        return [10.0**power for power in range(self.most, self.least - 1, -step)]
-
-
-def panel(place: Place, column: str, title: str, looks: dict[str, tuple[str, str]]) -> Markup:
-    """Draws one error of a place against time: `missed` or `false`."""
-    share: Callable[[Point], float] = lambda one: getattr(one, column)  # noqa: E731
-    slow = place.slow
-    scale = Scale([one.time for one in place.points if one not in slow], [share(one) for one in place.points])
-    bottom, right = HEIGHT - BOTTOM, WIDTH - RIGHT
-    made = [f'<text class="head" x="0" y="13">{escape(title)}</text>',
-            f'<rect class="strip" x="{LEFT}" y="{bottom - STRIP}" width="{right - LEFT}" height="{STRIP}"/>',
-            f'<text class="tick end" x="{LEFT - 5}" y="{bottom - STRIP / 2 + 4:.1f}">0</text>']  # fmt: skip
-    for value in scale.decades():
-        y = scale.y(value)
-        made.append(f'<line class="grid" x1="{LEFT}" x2="{right}" y1="{y:.1f}" y2="{y:.1f}"/>')
-        made.append(f'<text class="tick end" x="{LEFT - 5}" y="{y + 4:.1f}">{text.percent_tick(value)}</text>')
-    for value in scale.times:
-        x = scale.x(value)
-        made.append(f'<line class="grid" x1="{x:.1f}" x2="{x:.1f}" y1="{TOP}" y2="{bottom}"/>')
-        made.append(f'<text class="tick middle" x="{x:.1f}" y="{bottom + 15}">{text.tick(value)}</text>')
-    made.append(f'<text class="tick middle" x="{(LEFT + right) / 2:.0f}" y="{bottom + 32}">time per frame (ms)</text>')
-    exact = place.fastest_exact
-    if exact is not None:
-        x = scale.x(exact.time)
-        made.append(f'<rect class="slower" x="{x:.1f}" y="{TOP}" width="{right - x:.1f}" height="{bottom - TOP}"/>')
-    unknowing = next((one for one in place.points if one.exact and one.foresight == "none"), None)
-    lines = [(exact, "fastest exact", "beat", 15)] + [(unknowing, "no foresight", "beat unknowing", 3)] * (unknowing is not exact)
-    for one, name, kind, up in lines:  # the line further right begins below the name of the other
-        if one is None:
-            continue
-        x = scale.x(one.time)
-        end = x + 4 + 0.95 * FONT * len(name) > right
-        made.append(f'<line class="{kind}" x1="{x:.1f}" x2="{x:.1f}" y1="{TOP - up - 8}" y2="{bottom}"/>')
-        made.append(f'<text class="tick{" end" if end else ""}" x="{x + (-4 if end else 4):.1f}" y="{TOP - up}">{name}</text>')
-    front = place.fronts[column]
-    if front:
-        way = f"M{scale.x(front[0].time):.1f} {TOP}"
-        for one in front:
-            way += f"H{scale.x(one.time):.1f}V{scale.y(share(one)):.1f}"
-        made.append(f'<path class="front" d="{way}H{right}"/>')
-    for curve in place.curves:
-        points = " ".join(f"{scale.x(one.time):.1f},{scale.y(share(one)):.1f}" for one in curve.points)
-        made.append(f'<polyline class="dial" style="{_paint(looks[curve.id][0])}" points="{points}"/>')
-    for one in sorted(place.points, key=lambda one: (bool(one.mark), not one.exact)):
-        made.append(_drawn(one, scale.x(one.time), scale.y(share(one)), looks))
-    made += _labels(place, front, scale, share)
-    return Markup(
-        f'<svg class="time-error" role="img" viewBox="0 0 {WIDTH} {HEIGHT}" aria-label="{escape(_said(place, front, column, title), quote=True)}">'
-        + "".join(made) + "</svg>"
-    )  # fmt: skip
-
-
-def _paint(colour: str) -> str:
-    return f"--l:{colour};--d:{on_dark(colour)}"
-
-
-def _drawn(one: Point, x: float, y: float, looks: dict[str, tuple[str, str]]) -> str:
-    says = f"<title>{escape(f'{one.name}: {text.milliseconds(one.time)} ms, missed {text.percent(one.missed)}, false {text.percent(one.false)}')}</title>"
-    if one.exact:
-        return f'<circle class="exact" style="{_paint(EXACT)}" cx="{x:.1f}" cy="{y:.1f}" r="3.6">{says}</circle>'
-    return _mark(*looks[one.id], x, y, says)
-
-
-def _mark(colour: str, marker: str, x: float, y: float, says: str = "", scale: float = 0.85) -> str:
-    inner = symbol(Look(colour, marker, "-", True))
-    shape = inner[inner.index(">") + 1 : inner.rindex("</svg>")].split(" fill=")[0]  # in the colours of the scheme instead
-    return f'<g class="mark" style="{_paint(colour)}" transform="translate({x:.1f} {y:.1f}) scale({scale:g})">{shape}/>{says}</g>'
-
-
-def _labels(place: Place, front: Sequence[Point], scale: Scale, share: Callable[[Point], float]) -> list[str]:
-    """Writes the numbers of the front, then the values at both ends of each dial, next to their marks, where they cover neither marks nor
-    each other; values without room are left out."""
-    slow = place.slow
-    taken = [(scale.x(one.time), scale.y(share(one)), 5.0, 4.0) for one in place.points]
-    ends = [(curve.points[i], _short(float(curve.points[i].settings[curve.dial]))) for curve in place.curves for i in (0, -1)]
-    wanted = [(one, one.mark, "number") for one in front]
-    wanted += [(one, value, "value") for one, value in ends if one not in slow and share(one) > 0]
-    made = []
-    for one, word, kind in dict.fromkeys((id(one), word, kind) for one, word, kind in wanted):
-        point = next(other for other in place.points if id(other) == one)
-        x, y, half = scale.x(point.time), scale.y(share(point)), FONT * len(word) / 2 + 1
-        around = [(reach * math.cos(angle / 57.3) + math.copysign(half - 3, math.cos(angle / 57.3)) * (abs(math.cos(angle / 57.3)) > 0.1), reach * math.sin(angle / 57.3))
-                  for reach in (10, 14, 19, 25, 33) for angle in (135, 180, 225, 90, 270, 45, 315, 0)]  # fmt: skip
-        free = [
-            (dx, dy) for dx, dy in around
-            if LEFT < x + dx - half and x + dx + half < WIDTH - RIGHT and TOP < y + dy - 5 and y + dy + 5 < HEIGHT - BOTTOM
-            and not any(abs(x + dx - cx) < half + w and abs(y + dy - cy) < 5 + h for cx, cy, w, h in taken)
-        ]  # fmt: skip
-        if not free and kind == "value":
-            continue
-        dx, dy = free[0] if free else around[0]
-        taken.append((x + dx, y + dy, half, 5.0))
-        if math.hypot(dx, dy) > 19:
-            made.append(f'<line class="lead" x1="{x:.1f}" y1="{y:.1f}" x2="{x + dx * 0.7:.1f}" y2="{y + dy * 0.7:.1f}"/>')
-        made.append(f'<text class="{kind}" x="{x + dx:.1f}" y="{y + dy + 4:.1f}">{word}</text>')
-    return made
-
-
-def _said(place: Place, front: Sequence[Point], column: str, title: str) -> str:
-    told = "; ".join(f"{one.name}: {text.milliseconds(one.time)} ms, {text.percent(getattr(one, column))}" for one in front)
-    return f"{place.title}. {title} against time per frame; not dominated: {told}."
-
-
-@dataclass(frozen=True)
-class Shown:
-    """A place as the page shows it."""
-
-    place: Place
-    sentences: list[str]
-    panels: list[Markup]
-    legend: list[Entry]
-    rows: list[dict[str, str]]  #: of the named points
-    all_rows: list[dict[str, str]]
-    slow: int  #: contestants at the right edge of the panels
-
-
-def shown(study: Study) -> list[Shown]:
-    """Returns all that the page shows."""
-    found = places(study)
-    looks = series(found)
-    return [
-        Shown(
-            place, sentences(study, place),
-            [panel(place, "missed", "True pairs missed", looks), panel(place, "false", "Reported pairs that are false", looks)],
-            legend(place, looks), [_row(one) for one in place.named], [_row(one) for one in place.points],
-            len(place.slow),
-        )
-        for place in found
-    ]  # fmt: skip
-
-
-def _row(one: Point) -> dict[str, str]:
-    first = "never" if one.missed == 0 else text.MISSING if one.first is None else f"{text.count(one.first)} of {text.count(one.frames)}"
-    return {
-        "mark": one.mark, "name": one.name, "exact": "exact" if one.exact else "", "time": text.milliseconds(one.time),
-        "missed": text.percent(one.missed) if one.missed else "0", "false": text.percent(one.false) if one.false else "0",
-        "depth": text.significant(one.depth, 2) if one.missed else "0", "first": first,
-    }  # fmt: skip

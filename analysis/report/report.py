@@ -20,7 +20,7 @@ from advice import advice, summary
 from claims import claim_pictures, claims as paper_claims
 from claims.claim_points import ClaimError, Table
 from explorer import explore
-from figures import break_even, paper_figures, theory_figures, time_error
+from figures import break_even, paper_figures, theory_figures, time_error, time_error_panels
 from figures.canvas import Picture, picture
 from figures.colours import Look, looks
 from ratios import ageing, choices, robustness
@@ -104,8 +104,8 @@ def write(
     unique = study.runs.drop_duplicates("contestant")
     all_looks = looks(zip(unique["contestant"], unique["id"], unique["family"]))
     cells = advice.cells(study)
-    situations = advice.situations(study, cells)
-    errors = time_error.shown(study)
+    situations = advice.situations(cells)
+    errors = time_error_panels.shown(time_error.places(study))
     known = summary.paper(claims, folder)
     sentences = summary.sentences(study, situations, errors, known)
     anchors = {rows["group"].iloc[0]: group.anchor for rows, group in zip(study.groups(), groups)}
@@ -200,12 +200,14 @@ def _paper(
     return paper_figures.drawn(Table(study, "float"), claims.baselines, all_looks, folder)
 
 
+def environment() -> Environment:
+    """Returns the templates; all content from results is escaped in them."""
+    return Environment(loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+
+
 def render(**values: object) -> str:
-    """Renders the page as a text; all content from results is escaped."""
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    return environment.get_template("report.html.j2").render(**values)
+    """Renders the page as a text."""
+    return environment().get_template("report.html.j2").render(**values)
 
 
 def _values(column: pd.Series, shorten: Optional[int] = None) -> str:

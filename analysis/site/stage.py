@@ -18,6 +18,7 @@ ROOT = HERE.parents[1]
 sys.path[:0] = [str(HERE), str(HERE.parent)]
 
 import claims_page  # noqa: E402
+import error_page  # noqa: E402
 import lessons_page  # noqa: E402
 import python_pages  # noqa: E402
 import strategy_pages  # noqa: E402
@@ -146,6 +147,7 @@ def main() -> int:
     (pages / "adr.md").write_text(decisions(pages_of_tree))
     strategy_pages.write(listed, results, ROOT, pages)
     (pages / "claims.md").write_text(claims_page.page(results))
+    (pages / "errors.md").write_text(error_page.page(results))
     (pages / "report.md").write_text(report_page(html, results))
     (pages / "python.md").write_text(python_pages.reference(ROOT / "analysis" / "kbvh"))
     (pages / "notebooks.md").write_text(notebooks(run, pages))

@@ -76,7 +76,7 @@ def settings(label: str) -> str:
     return found.group(1) if found else "as preferred"
 
 
-def measured(id: str, cells: list[advice.Cell], record: advice.Record | None, labels: dict[str, str]) -> list[str]:
+def measured(id: str, cells: list[advice.MeasuredCell], record: advice.Record | None, labels: dict[str, str]) -> list[str]:
     """Returns the part on results."""
     own = [one for one in cells if id in one.speeds]
     if not own or record is None:
@@ -99,7 +99,7 @@ def measured(id: str, cells: list[advice.Cell], record: advice.Record | None, la
 
 
 def page(
-    info: dict[str, Any], root: Path, cells: list[advice.Cell], record: advice.Record | None, labels: dict[str, str]
+    info: dict[str, Any], root: Path, cells: list[advice.MeasuredCell], record: advice.Record | None, labels: dict[str, str]
 ) -> str:
     lines = [f"# `{info['id']}`: {info['title']}", "", info["about"] or "Its file has no description.", ""]
     rows: list[list[object]] = [

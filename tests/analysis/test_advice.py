@@ -10,7 +10,7 @@ from typing import Any
 
 import paths
 
-from advice import advice
+from advice import advice, cells_file
 from ratios import ageing
 import synthetic
 from results.load import ResultError, Study, load
@@ -31,7 +31,7 @@ def study(lines: list[dict[str, Any]]) -> Study:
 
 def taken(lines: list[dict[str, Any]], number: int = 0) -> list[advice.Advice]:
     """The advice of one situation, from the least knowledge to the most."""
-    found = [best for _, best in advice.situations(study(lines))[number].advice]
+    found = [best for _, best in advice.situations(advice.cells(study(lines)))[number].advice]
     assert all(found)
     return found
 
@@ -91,7 +91,7 @@ class TestRule(unittest.TestCase):
     def test_cells_without_a_refit_count_nowhere(self) -> None:
         alone = [other("one", 1.0, "ball"), other("two", 2.0, "ball")]
         self.assertEqual(len(advice.cells(study([*alone, line("refit", 2.0), other("one", 1.0)]))), 1)
-        self.assertEqual(advice.situations(study(alone)), [])
+        self.assertEqual(advice.situations(advice.cells(study(alone))), [])
 
     def test_situations_follow_from_what_was_recorded(self) -> None:
         def both(scene: str, **changes: Any) -> list[dict[str, Any]]:
@@ -104,7 +104,7 @@ class TestRule(unittest.TestCase):
         for one in self_pairs:
             one["scene"]["bodies"][0]["self"] = True
         lines = both("rays", rays="coherent:64") + self_pairs + both("few", per_keyframe=1) + both("more", per_keyframe=9) + both("many", per_keyframe=10)
-        found = [(one.asks, one.frames) for one in advice.situations(study(lines))]
+        found = [(one.asks, one.frames) for one in advice.situations(advice.cells(study(lines)))]
         frames = list(advice.FRAMES)
         self.assertEqual(found[:3], [(advice.PAIRS, name) for name in frames])
         self.assertEqual([asks for asks, _ in found[3:]], [advice.SELF, "rays"])
@@ -118,14 +118,36 @@ class TestRule(unittest.TestCase):
 
 
 class TestGuide(unittest.TestCase):
-    def test_the_guide_has_what_the_reference_run_recommends(self) -> None:
+    def test_the_guide_has_what_the_cells_that_come_with_the_project_recommend(self) -> None:
         root = paths.HERE.parents[1]
         page = (root / "analysis" / "guides" / "choosing.md").read_text(encoding="utf-8")
-        self.assertEqual(advice.inserted(page, advice.markdown(load(root / "analysis" / "reference")), "choosing.md"), page)
+        kept = cells_file.read(root / "analysis" / "reference" / cells_file.FILE)
+        self.assertEqual(cells_file.inserted(page, cells_file.table(kept), "choosing.md"), page)
+        self.assertLessEqual({advice.PAIRS, advice.SELF}, {cell.asks for cell in kept.cells})
+
+    def test_the_file_of_cells_gives_the_same_advice(self) -> None:
+        lines = [line("refit", 2.0, "a"), other("join", 1.0, "a", foresight="next_keyframe"), line("refit", 1.0, "b"), other("join", 1.3, "b")]
+        for one in lines[2:]:
+            one["scene"].update(per_keyframe=1)
+        rays = [line("refit", 2.0, "c"), other("join", 1.0, "c")]
+        for one in rays:
+            one["scene"].update(rays="coherent:64")
+        lines[1]["times"]["disturbed"] = "9 involuntary switches"
+        found = cells_file.of_study(study([*lines, *rays]))
+        with tempfile.TemporaryDirectory(prefix="kbvh-analysis-") as name:
+            file = Path(name) / cells_file.FILE
+            file.write_text(cells_file.content(found), encoding="utf-8")
+            self.assertEqual(cells_file.table(cells_file.read(file)), cells_file.table(found))
+            self.assertEqual(cells_file.read(file).told, found.told)
+            both = cells_file.gathered([file, file])
+            self.assertEqual([one.cells for one in advice.situations(both.cells)], [2 * one.cells for one in advice.situations(found.cells)])
+            for old, new, why in (("kbvh-cells-1", "kbvh-cells-0", "schema"), ('"speeds"', '"speed"', "speeds"), ('"join": [', '"join2": [', "belong together")):
+                file.write_text(cells_file.content(found).replace(old, new), encoding="utf-8")
+                self.assertRaisesRegex(ResultError, why, cells_file.read, file)
 
     def test_a_page_without_a_place_is_refused(self) -> None:
         with self.assertRaises(ResultError):
-            advice.inserted("no place", "table", "page.md")
+            cells_file.inserted("no place", "table", "page.md")
 
 
 class TestAgeing(unittest.TestCase):

@@ -10,6 +10,7 @@ import paths
 
 ROOT = paths.HERE.parents[1]
 sys.path.insert(0, str(ROOT / "analysis" / "site"))
+import error_page  # noqa: E402
 import furo_from_debian  # noqa: E402
 import lessons_page  # noqa: E402
 import links  # noqa: E402
@@ -43,6 +44,24 @@ class Links(unittest.TestCase):
     def test_a_link_to_the_lab_carries_a_state(self):
         self.assertEqual(self.dead(a='<a href="lab/index.html#scene=cloth">lab</a>', lab__index=""), [])
         self.assertEqual(len(self.dead(a='<a href="lab/none.html#scene=cloth">lab</a>', lab__index="")), 1)
+
+
+class Errors(unittest.TestCase):
+    def test_every_figure_says_when_it_was_measured_and_what_each_panel_shows(self):
+        page = error_page.page(ROOT / "analysis" / "reference")
+        figures = page.split("\n## ")[1:]
+        self.assertGreater(len(figures), 0)
+        for figure in figures:
+            self.assertRegex(figure, r"\nMeasured \d{4}-\d\d-\d\d.* by commit [0-9a-f]{8}.*: \d+ contestants, \d+ .*rounds?; the machine was (quiet|disturbed while \d+)")
+            self.assertRegex(figure, r"exact is [\d.]+|no approximate contestant")
+            self.assertEqual(figure.count('<svg class="time-error" '), 4)
+            self.assertEqual(len(re.findall(r"</svg><figcaption>[^<]{30,}\.</figcaption>", figure)), 4)
+            # A blank line would end raw HTML for no reader of Sphinx, but a fence inside of it would.
+            self.assertEqual(figure.count("```"), 2)
+
+    def test_results_without_the_file_are_no_error(self):
+        with tempfile.TemporaryDirectory() as name:
+            self.assertIn("There is no `errors.json`", error_page.page(Path(name)))
 
 
 class Furo(unittest.TestCase):

@@ -13,9 +13,9 @@ import synthetic
 from synthetic import line
 from test_advice import other
 
-from advice import advice, summary
+from advice import advice, cells_file, summary
 from claims import claims
-from figures import time_error
+from figures import time_error, time_error_file, time_error_panels
 from results.load import Study, load
 
 
@@ -83,18 +83,43 @@ class TestSentences(unittest.TestCase):
     def said(self, lines: list[dict[str, Any]]) -> dict[str, str]:
         study = self.study(lines)
         known = summary.Paper([], "")
-        found = summary.sentences(study, advice.situations(study), time_error.shown(study), known)
+        found = summary.sentences(study, advice.situations(advice.cells(study)), time_error_panels.shown(time_error.places(study)), known)
         return {one.subject: one.says for one in found}
 
     def test_what_to_take_follows_the_rule(self) -> None:
         said = self.said([line("refit", 2.0), other("join", 1.0, foresight="next_keyframe")])
         self.assertEqual(
             said["What to take"],
-            "With 10 frames a keyframe and more, take refit where nothing is known: the best refit in the only cell; join if the next keyframe "
-            "is known: 2.00 times as fast as the best refit (in 1 cell).",
+            "With 10 frames a keyframe and more, take refit where nothing is known: the best refit in the only cell, at 2.00 ms a frame; join if the "
+            "next keyframe is known: 2.00 times as fast as the best refit (in 1 cell), at 1.00 ms a frame.",
         )
         self.assertIn("Pairs within a body and rays were not asked for", said["Other questions"])
         self.assertIn("answers wrongly", said["Time against error"])
+
+    def test_what_a_study_did_not_ask_is_answered_by_measurements_that_come_with_the_project(self) -> None:
+        lines = [line("refit", 2.0), other("join", 1.0, foresight="next_keyframe")]
+        kept = json.loads(json.dumps(lines))
+        for one in kept:
+            one["scene"].update(rays="coherent:64")
+        wrong = line("stale", 1.0, guarantee="approximate")
+        wrong["verified"].update(pairs=1000, missed=5)
+        situations = advice.situations(advice.cells(self.study(lines)))
+        with tempfile.TemporaryDirectory(prefix="kbvh-analysis-") as name:
+            folder = Path(name)
+            self.assertEqual(summary.on_others(situations, folder), "Pairs within a body and rays were not asked for in this study.")
+            (folder / "cells.json").write_text(cells_file.content(cells_file.of_study(self.study(kept))), encoding="utf-8")
+            says = summary.on_others(situations, folder)
+            self.assertRegex(says, r"not asked for in this study\. By measurements that come with the project \(plan .*\): With 10 frames .* and rays, take refit where")
+            self.assertNotIn("come with", summary.on_others(advice.situations([*advice.cells(self.study(kept)), *self.within()]), folder))
+            self.assertNotIn("Elsewhere", summary.on_errors([], folder))
+            (folder / "errors.json").write_text(time_error_file.content(time_error.places(self.study([*lines, wrong]))), encoding="utf-8")
+            self.assertRegex(summary.on_errors([], folder), r"Elsewhere: Without knowledge .* Measured .*commit ")
+
+    def within(self) -> list[advice.MeasuredCell]:
+        lines = [line("refit", 2.0, "alone"), other("join", 1.0, "alone", foresight="next_keyframe")]
+        for one in lines:
+            one["scene"]["bodies"][0]["self"] = True
+        return advice.cells(self.study(lines))
 
     def test_disturbed_runs_are_counted_and_old_ones_unknown(self) -> None:
         lines = [synthetic.add_frames(line(f"refit_{i}", 1.0)) for i in range(4)]

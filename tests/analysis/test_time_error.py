@@ -14,8 +14,8 @@ import paths  # noqa: F401  (finds the modules under test)
 
 from report import report
 import synthetic
-from figures import time_error
-from results.load import Study, load
+from figures import time_error, time_error_file, time_error_panels
+from results.load import ResultError, Study, load
 from synthetic import line
 
 WRONG = dict(guarantee="approximate", tightness="none")
@@ -60,7 +60,7 @@ class TestTimeError(unittest.TestCase):
         for one in lines:
             for name in ("first_missed", "missed_depth_in_edges"):
                 one["verified"].pop(name, None)
-        (shown,) = time_error.shown(self.study(lines))
+        (shown,) = time_error_panels.shown(time_error.places(self.study(lines)))
         self.assertEqual([row["first"] for row in shown.all_rows], ["–", "never"])
         self.assertEqual([row["depth"] for row in shown.all_rows], ["–", "0"])
 
@@ -80,7 +80,7 @@ class TestTimeError(unittest.TestCase):
         self.assertEqual([(one.id, one.mark) for one in place.named], [("a", "1"), ("b", "2"), ("refit", "3")])
         for column, front in place.fronts.items():
             for one in front:
-                better = [other for other in place.points if other.time < one.time and getattr(other, column) <= getattr(one, column)]
+                better = [other for other in place.points if other.time < one.time and time_error.MEASURES[column].of(other) <= time_error.MEASURES[column].of(one)]
                 self.assertEqual(better, [], one.id)
 
     def test_the_sentence_compares_the_fastest_of_each(self) -> None:
@@ -110,31 +110,31 @@ class TestTimeError(unittest.TestCase):
         self.assertTrue(known.startswith("With any knowledge") and "1.25 times as fast" in known, known)
 
     def test_places_of_marks_follow_time_and_share(self) -> None:
-        scale = time_error.Scale([1.0, 10.0], [0.0, 0.001, 0.1])
+        scale = time_error_panels.Scale([1.0, 10.0], [0.0, 0.001, 0.1])
         self.assertLess(scale.x(1.0), scale.x(10.0))
         self.assertAlmostEqual(scale.x(10**0.5), (scale.x(1.0) + scale.x(10.0)) / 2)
         self.assertAlmostEqual(scale.y(0.001) - scale.y(0.01), scale.y(0.01) - scale.y(0.1))
-        self.assertGreater(scale.y(0.0), scale.y(0.001) + time_error.STRIP / 2, "zero is apart")
+        self.assertGreater(scale.y(0.0), scale.y(0.001) + time_error_panels.STRIP / 2, "zero is apart")
 
     def test_the_panels_draw_every_contestant_slow_ones_at_the_edge(self) -> None:
         lines = [exact("refit", 2.0), wrong("a", 1.0, 500), wrong("b", 1.5, 100, extra=4), wrong("slow", 40.0, 3)]
-        (shown,) = time_error.shown(self.study(lines))
+        (shown,) = time_error_panels.shown(time_error.places(self.study(lines)))
         self.assertEqual(shown.slow, 1)
-        for panel in shown.panels:
+        for panel in (one.drawn for one in shown.panels):
             places = [float(x) for x in re.findall(r'class="mark"[^>]*translate\(([\d.]+)', panel)]
             self.assertEqual(len(places), 3)
-            self.assertEqual([x for x in places if x >= time_error.WIDTH - time_error.RIGHT], [time_error.WIDTH - time_error.RIGHT])
+            self.assertEqual([x for x in places if x >= time_error_panels.WIDTH - time_error_panels.RIGHT], [time_error_panels.WIDTH - time_error_panels.RIGHT])
             self.assertEqual(len(re.findall('class="exact"', panel)), 1)
             self.assertIn('class="beat"', panel)
             for number in re.findall(r'\b(?:x|y|x1|x2|y1|y2|cx|cy)="([^"]*)"', panel):
-                self.assertTrue(-1 <= float(number) <= max(time_error.WIDTH, time_error.HEIGHT), number)
-        self.assertEqual(re.findall('class="number"[^>]*>([^<]*)<', shown.panels[0]), ["1", "2", "3"])
+                self.assertTrue(-1 <= float(number) <= max(time_error_panels.WIDTH, time_error_panels.HEIGHT), number)
+        self.assertEqual(re.findall('class="number"[^>]*>([^<]*)<', shown.panels[0].drawn), ["1", "2", "3"])
         self.assertEqual(len(shown.all_rows), 4)
 
     def test_no_line_and_no_mark_crosses_the_name_of_a_vertical_line(self) -> None:
         lines = [exact("join", 1.5, foresight="next_keyframe"), exact("refit", 1.6), exact("slow", 9.0), wrong("a", 1.52, 1000), wrong("b", 1.55, 900)]
-        (shown,) = time_error.shown(self.study(lines))
-        for panel in shown.panels:
+        (shown,) = time_error_panels.shown(time_error.places(self.study(lines)))
+        for panel in (one.drawn for one in shown.panels):
             names = re.findall(r'<text class="tick" x="([\d.]+)" y="([\d.]+)">(fastest exact|no foresight)<', panel)
             self.assertEqual(len(names), 2)
             marks = re.findall(r'translate\(([\d.]+) ([\d.]+)', panel)
@@ -143,9 +143,69 @@ class TestTimeError(unittest.TestCase):
             self.assertGreaterEqual(len(marks), 2)
             self.assertGreaterEqual(len(falls), 3)
             for x, y, name in names:
-                left, right, foot = float(x), float(x) + time_error.FONT * len(name), float(y)
+                left, right, foot = float(x), float(x) + time_error_panels.FONT * len(name), float(y)
                 for at, top in [*falls, *((x, str(float(y) - 4)) for x, y in marks)]:
                     self.assertFalse(left < float(at) < right and float(top) < foot, f"{name}: {at}, {top}")
+
+    def test_labels_cover_neither_marks_nor_each_other(self) -> None:
+        # Dials that begin with the same value at nearly the same place: "300 300" was read as one number.
+        for crowd in (1.0, 1.02, 1.3):
+            lines = [exact("refit", 2.0), exact("other", 2.02), exact("third", 2.04)]
+            for i, box_tests in enumerate((300, 1000, 3000, 10000)):
+                lines += [wrong(f"budget{k}", (1 + i / 8) * crowd**k, 900 - 200 * i - k, box_tests=box_tests) for k in range(6)]
+            (shown,) = time_error_panels.shown(time_error.places(self.study(lines)))
+            self.assertEqual([one.name for one in shown.panels + shown.more], ["missed", "false", "depth", "first"])
+            for panel in shown.panels + shown.more:
+                labels = [(kind, float(x), float(y) - 4, word) for kind, x, y, word in
+                          re.findall(r'<text class="(number|value)"[^>]* x="([\d.]+)" y="([\d.]+)">([^<]*)<', panel.drawn)]  # fmt: skip
+                marks = [(float(x), float(y)) for x, y in re.findall(r'class="mark"[^>]*translate\(([\d.]+) ([\d.]+)', panel.drawn)]
+                if panel.name == "missed":
+                    self.assertGreater(len([one for one in labels if one[0] == "value"]), 1)
+                for i, (kind, x, y, word) in enumerate(labels):
+                    half = 3.1 * len(word)  # of a digit 6.2 wide, measured in Chromium at the largest of both sizes
+                    for at, up in marks:
+                        self.assertFalse(abs(x - at) < half + 3 and abs(y - up) < 7, f"{crowd} {panel.name}: {word} covers a mark")
+                    for other, at, up, said in labels[:i]:
+                        gap = abs(x - at) - half - 3.1 * len(said)
+                        self.assertFalse(gap < 3 and abs(y - up) < 9, f"{crowd} {panel.name}: {word} and {said} are {gap:.1f} apart")
+
+    def test_every_panel_says_what_it_shows(self) -> None:
+        lines = [exact("join", 0.8, foresight="next_keyframe"), exact("refit", 2.0), wrong("a", 1.0, 500, extra=10), wrong("b", 1.5, 5), wrong("c", 3.0, 0)]
+        (place,) = time_error.places(self.study(lines))
+        says = {name: time_error.finding(place, name) for name in time_error.MEASURES}
+        self.assertRegex(says["missed"], r"^2 of 3 approximate contestants are faster than refit, .*they miss 0\.50\s% \(b\) to 50\s% \(a\)\.$")
+        self.assertRegex(says["false"], r"^1 of 3 approximate contestants reports false pairs, at most 2\.0\s% of what they report \(a\); the other 2 report none\.$")
+        self.assertRegex(says["depth"], r"less than 1\s% of the pairs miss none deeper than 0\.25 edge lengths \(b\); the deepest .* 0\.25")
+        self.assertRegex(says["first"], r"^2 of the 2 that miss a pair begin within ten frames .*\(frame 8 of \d+\); the last to begin is .*, at frame 8\.$")
+        place = self.place([exact("refit", 0.5), wrong("a", 1.0, 500)])
+        self.assertIn("None of 1 approximate contestant is faster than refit", time_error.finding(place, "missed"))
+        self.assertIn("reports a false pair", time_error.finding(place, "false"))
+
+    def test_the_file_has_all_that_is_drawn(self) -> None:
+        lines = [exact("refit", 2.0), exact("clip", 0.8, foresight="whole_clip")]
+        lines += [wrong("stale", 1.0 + every / 8, 100 - every, extra=every, refit_every=every) for every in (8, 2, 4)]
+        places = time_error.places(self.study(lines))
+        with tempfile.TemporaryDirectory(prefix="kbvh-analysis-") as name:
+            file = Path(name) / time_error_file.FILE
+            file.write_text(time_error_file.content(places), encoding="utf-8")
+            again = time_error_file.read(file)
+            for own, other in zip(time_error_panels.shown(places), time_error_panels.shown(again)):
+                self.assertEqual((own.place.title, own.place.measured, own.sentences), (other.place.title, other.place.measured, other.sentences))
+                self.assertEqual((own.panels, own.more, own.legend, own.all_rows), (other.panels, other.more, other.legend, other.all_rows))
+            self.assertIn("Measured ", again[0].measured)
+            for text, why in (("{}", "schema"), (file.read_text().replace('"missed"', '"mist"'), "fields"), (file.read_text().replace('"title"', '"name"', 1), "title")):
+                file.write_text(text, encoding="utf-8")
+                self.assertRaisesRegex(ResultError, why, time_error_file.read, file)
+
+    def test_the_command_says_what_the_figures_show(self) -> None:
+        with tempfile.TemporaryDirectory(prefix="kbvh-analysis-") as name, contextlib.redirect_stdout(io.StringIO()) as out:
+            folder = synthetic.write(Path(name), [exact("refit", 2.0), wrong("a", 1.0, 5)])
+            self.assertEqual(time_error_file.main([str(folder), "--write", str(folder / "errors.json")]), 0)
+            self.assertEqual(len(time_error_file.read(folder / "errors.json")), 1)
+            self.assertIn("1 of 1 approximate contestant is faster", out.getvalue().replace("\u00a0", " "))
+        with tempfile.TemporaryDirectory(prefix="kbvh-analysis-") as name, contextlib.redirect_stderr(io.StringIO()) as out:
+            self.assertEqual(time_error_file.main([str(synthetic.write(Path(name), [exact("refit", 2.0), exact("tree", 1.0)]))]), 2)
+            self.assertIn("wrongly", out.getvalue())
 
     def test_it_follows_the_answers_where_there_is_an_error(self) -> None:
         for lines, there in (([exact("refit", 2.0), wrong("a", 1.0, 5)], True), ([exact("refit", 2.0), exact("tree", 1.0)], False)):
@@ -160,8 +220,8 @@ class TestTimeError(unittest.TestCase):
     def test_names_are_escaped(self) -> None:
         bad = wrong("a", 1.0, 5)
         bad["strategy"]["title"] = "<b>&"
-        (shown,) = time_error.shown(self.study([exact("refit", 2.0), bad]))
-        self.assertNotIn("<b>", "".join(shown.panels))
+        (shown,) = time_error_panels.shown(time_error.places(self.study([exact("refit", 2.0), bad])))
+        self.assertNotIn("<b>", "".join(one.drawn for one in shown.panels))
 
 
 if __name__ == "__main__":

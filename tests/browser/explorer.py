@@ -109,7 +109,7 @@ def expectations(folder: Path, study: Any) -> dict[str, Any]:
         "results": str(folder / "results.jsonl"),
         "situations": [
             [one.asks, one.frames, one.cells, [best and [best.id, best.speed, best.low, best.high, best.measured, best.best_in] for _, best in one.advice]]
-            for one in advice.situations(load(folder))
+            for one in advice.situations(advice.cells(load(folder)))
         ],
         "runs": len(runs),
         "usual": len(usual),

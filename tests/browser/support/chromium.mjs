@@ -17,6 +17,7 @@ export async function startBrowser(flags = ['--disable-gpu']) {
     userDataDir: profile,
     args: ['--no-sandbox', ...flags, '--disable-quic', '--no-first-run', '--disable-background-networking',
       '--disable-component-update', '--disable-sync', '--allow-file-access-from-files=false'],
+    timeout: 300000,  // a busy machine takes minutes to start it
     protocolTimeout: 300000,
   });
   return {

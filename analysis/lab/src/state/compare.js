@@ -107,6 +107,7 @@ export class Comparison {
       for (let round = 0; round < mostRounds && (round === 0 || performance.now() - began < timingBudget); ++round)
         for (const [k, choice] of chosen.entries()) {
           await load(choice);
+          if (number !== this.measuring) return; // a newer measurement has loaded its own clip, which must not be played
           const times = await this.meter.time();
           if (number !== this.measuring) return;
           clips[k].push(times);
