@@ -59,6 +59,16 @@ BallSearch<S>::BallSearch(const Ball<S>& ball, std::uint32_t index, BallHits& fo
 }
 
 template <class S>
+bool BallSearch<S>::apart(const double* corners) const {
+  for (int axis = 0; axis < 3; ++axis) {
+    // The rounding of a difference is monotone, so a rounded gap beyond the radius is a gap beyond it.
+    const auto [low, high] = std::minmax({corners[axis], corners[axis + 3], corners[axis + 6]});
+    if (low - centre_[axis] > radius_ || centre_[axis] - high > radius_) return true;
+  }
+  return false;
+}
+
+template <class S>
 bool BallSearch<S>::offer(std::uint32_t body, std::uint32_t primitive, const PolygonTriangles& polygon,
                           const S* positions, TriangleTestStats& stats) {
   for (std::uint32_t i = 0; i < polygon.count(); ++i) {
@@ -68,6 +78,10 @@ bool BallSearch<S>::offer(std::uint32_t body, std::uint32_t primitive, const Pol
       for (std::size_t axis = 0; axis < 3; ++axis)
         corners[3 * c + axis] = double(positions[std::size_t(3) * vertices[c] + axis]);
     ++stats.tests;
+    if (apart(corners)) {
+      ++stats.filtered;
+      continue;
+    }
     DistanceComparison<BoundedDouble> filtered(radius_);
     bool met = compare(filtered, centre_, corners);
     if (filtered.undecided()) {

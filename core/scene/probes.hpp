@@ -38,8 +38,6 @@ class BallBox {
       if (!(double(box.lower[axis]) <= upper_[axis] && double(box.upper[axis]) >= lower_[axis])) return false;
     return true;
   }
-  const double* lower() const { return lower_; }
-  const double* upper() const { return upper_; }
 
  private:
   double lower_[3], upper_[3];
@@ -60,6 +58,9 @@ class BallSearch {
   double limit() const { return 0; }
 
  private:
+  /// Returns whether a triangle is certainly farther than the radius along an axis.
+  bool apart(const double* corners) const;
+
   double centre_[3], radius_;
   std::uint32_t index_;
   BallHits* found_;

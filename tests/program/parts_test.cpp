@@ -167,7 +167,7 @@ TEST(Plan, ErrorsNameFileKeyAndValue) {
             "p.json: there is no key 'repetition'; known are builder, changes, continuous, description, "
             "frames_limit, interval_width, kernels, l, name, "
             "oracle_every, params, rays, repetitions, scalars, scenes, seconds, strategies, studies, "
-            "targets; did you mean "
+            "targets, within; did you mean "
             "'repetitions'?");
   EXPECT_TRUE(contains(plan_complaint("{\n  \"scenes\": ]\n}"), "p.json: line 2, column 13"));
   EXPECT_TRUE(contains(plan_complaint("[]"), "p.json: expected an object"));
