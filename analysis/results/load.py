@@ -19,6 +19,7 @@ import numpy as np
 import pandas as pd
 
 from results import clip_times, files, scene_names
+from results.files import ResultError
 
 SCHEMA = 2
 #: Times of schema 1 leave out the beginning of the clip. They are shown, but in groups of their own.
@@ -30,10 +31,6 @@ READ_COUNTERS = ("certificates_failed", "values_written", "positions_fetched")
 #: Counters that are a level, not a sum over the clip.
 LEVELS = ("queue_peak", "list_peak", "most_nodes_searched")
 GUARANTEES = ("exact", "candidate_superset", "approximate")
-
-
-class ResultError(Exception):
-    """Reports an unusable result file in one sentence for the user."""
 
 
 def read_json(file: Path, schema: str, error: type[Exception]) -> dict[str, Any]:
@@ -61,7 +58,6 @@ class Study:
     repetitions: pd.DataFrame
     notes: list[str]
     raw: dict[int, clip_times.RawTimes] = field(default_factory=dict, repr=False, compare=False)
-    _times: dict[tuple[str, ...], dict[int, np.ndarray]] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def groups(self) -> list[pd.DataFrame]:
         """Returns the runs of each group, in the order of a report: scenes as in the file, then size, scalar and l."""
@@ -75,15 +71,6 @@ class Study:
     def sessions(self) -> dict[int, Any]:
         """The session of each run."""
         return dict(zip(map(int, self.runs["run"]), self.runs["session"]))
-
-    def times(self, phases: tuple[str, ...]) -> dict[int, np.ndarray]:
-        """Returns the time per frame in ms of each repetition of each run, over some phases; added up once for all callers."""
-        if phases not in self._times:
-            rows = self.repetitions.sort_values(["run", "repetition"])
-            sums = rows[list(phases)].sum(axis=1).to_numpy(dtype=float)
-            runs, starts = np.unique(rows["run"].to_numpy(), return_index=True)
-            self._times[phases] = {int(run): part for run, part in zip(runs, np.split(sums, starts[1:]))}
-        return self._times[phases]
 
     @property
     def timed(self) -> pd.DataFrame:
@@ -182,7 +169,7 @@ def load(folder: Path, newest_of: tuple[str, ...] = ONE_OF_ALL_COMMITS) -> Study
             row = _row(record, index)
             times = _repetitions(record, index, row)
             if times:
-                raw[index] = _raw(record, row, times)
+                raw[index] = _raw(record, row)
         except ResultError as problem:
             notes.append(f"Line {index + 1} of {FILE_NAME} was skipped: {str(problem).removeprefix(place).lstrip(':, ')}")
             continue
@@ -423,16 +410,15 @@ def _instructions(record: _Record, params: dict[str, Any], machine: dict[str, st
     return record.text("strategy.instructions", "") or (chosen if chosen != "auto" else machine["kernels"])
 
 
-def _raw(record: _Record, row: dict[str, Any], means: list[dict[str, float]]) -> clip_times.RawTimes:
-    """Returns the raw times of a record with times, whose means per frame are known."""
-    sums = np.array([[one[name] for name in clip_times.PARTS] for one in means])
-    session, disturbed = row["session"], row["disturbed"]
+def _raw(record: _Record, row: dict[str, Any]) -> clip_times.RawTimes:
+    """Returns the raw times of a record whose repetitions are known to have times."""
     listed = record.get("times.repetitions")
+    sums = _sums(record, listed, "")
     if not all(isinstance(one, dict) and "totals" in one for one in listed):
         if row["schema"] == SCHEMA:
             raise ResultError(f"{record.place}: times.repetitions: totals are missing.")
-        motions = np.array([[one["motion"]] for one in means])
-        return clip_times.RawTimes(sums.sum(axis=1, keepdims=True), motions, sums, None, None, True, session, disturbed)
+        motions = np.array([[one["motion"]] for one in listed], dtype=float)
+        return clip_times.RawTimes(sums.sum(axis=1, keepdims=True), motions, sums, None, None, True, row["session"], row["disturbed"])
     try:
         totals, motions = (np.array([one[name] for one in listed], dtype=float) for name in ("totals", "motions"))
     except (KeyError, TypeError, ValueError) as problem:
@@ -443,16 +429,17 @@ def _raw(record: _Record, row: dict[str, Any], means: list[dict[str, float]]) ->
     if begin is not None:
         if isinstance(begin, bool) or not isinstance(begin, int) or not 0 <= begin < totals.shape[1]:
             raise ResultError(f"{record.place}: times.steady_from should be a frame.")
-        steady = []
-        for number, entry in enumerate(listed):
-            one = _Record(entry, f"{record.place}, repetition {number + 1}")
-            parts = [one.number(f"steady.{name}") for name in clip_times.PARTS]
-            parts[-1] += one.number("steady.geometry_changes", 0.0)
-            steady.append(parts)
+        steady = _sums(record, listed, "steady.")
     by_clips = record.text("times.by", "frames") != "frames"
-    return clip_times.RawTimes(
-        totals, motions, sums, None if steady is None else np.array(steady), begin, by_clips, session, disturbed
-    )  # fmt: skip
+    return clip_times.RawTimes(totals, motions, sums, steady, begin, by_clips, row["session"], row["disturbed"])
+
+
+def _sums(record: _Record, listed: list[Any], part: str) -> np.ndarray:
+    """Returns the phases of each repetition, [repetition][clip_times.PARTS]; means serve as sums, because only shares count."""
+    entries = [_Record(entry, f"{record.place}, repetition {number + 1}") for number, entry in enumerate(listed)]
+    return np.array(
+        [[one.number(part + name, 0.0 if name.endswith("changes") else _MISSING) for name in clip_times.PARTS] for one in entries]
+    )
 
 
 def _threads(params: dict[str, Any]) -> int:
@@ -499,13 +486,14 @@ def _newest(runs: pd.DataFrame, columns: tuple[str, ...]) -> tuple[pd.DataFrame,
     return newest.reset_index(drop=True), len(runs) - len(newest)
 
 
-#: Times of runs, by the phases that they add up.
+#: Times of runs, with the program's names of what they add up.
 SUMS = {
-    **{name: (name,) for name in PHASES},
-    "query": ("traversal", "triangle_tests"),
-    "updating": ("update", "plan_changes"),
-    "total": clip_times.PARTS,
-    "total_motion": PHASES,
+    **{name: name for name in PHASES},
+    "plan_changes": "changes",
+    "query": "query",
+    "updating": "upkeep",
+    "total": "total",
+    "total_motion": "total_with_motion",
 }
 
 
@@ -514,9 +502,9 @@ def _with_times(runs: pd.DataFrame, times: pd.DataFrame, raw: dict[int, clip_tim
     total, and `middle_` and a phase: that phase in the repetition with the median total.
     """
     found = pd.DataFrame(
-        {name: [clip_times.time_of(one, phases) for one in raw.values()] for name, phases in SUMS.items()}, index=list(raw), dtype=float
+        {name: [clip_times.time_of(one, phase) for one in raw.values()] for name, phase in SUMS.items()}, index=list(raw), dtype=float
     )
-    found["steady"] = [clip_times.time_of(one, clip_times.PARTS, steady=True) for one in raw.values()]
+    found["steady"] = [clip_times.time_of(one, "total", steady=True) for one in raw.values()]
     sums = times.assign(total_motion=times[list(PHASES)].sum(axis=1))
     extremes = sums.groupby("run")["total_motion"].agg(["min", "max", "count", "median"])
     found["spread"] = (extremes["max"] - extremes["min"]) / extremes["median"].where(extremes["median"] > 0)
