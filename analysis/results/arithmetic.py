@@ -21,8 +21,8 @@ from results.files import ResultError
 NAME = "clip_times.so"
 #: Each file of the sources, below the root of the tree.
 SOURCES = (
-    "analysis/results/clip_times.cpp", "experiments/study/raw_times.cpp", "experiments/study/raw_times.hpp", "experiments/study/chance.hpp",
-    "core/judge/phase_times.hpp",
+    "analysis/results/clip_times.cpp", "experiments/study/raw_times.cpp", "experiments/study/raw_times.hpp",
+    "experiments/study/resamples.hpp", "experiments/study/chance.hpp", "core/judge/phase_times.hpp",
 )  # fmt: skip
 FLAGS = ("-std=c++20", "-O2", "-ffp-contract=off", "-fPIC", "-shared")
 

@@ -1,6 +1,6 @@
-// The arithmetic of times for Python: raw_times.hpp behind functions that ctypes can call (clip_times.py).
-// Tables are contiguous doubles, times in ms. Arguments are trusted: clip_times.py checks shapes, load.py
-// values.
+// The arithmetic of times for Python: raw_times.hpp and resamples.hpp behind functions that ctypes can call
+// (clip_times.py). Tables are contiguous doubles, times in ms. Arguments are trusted: clip_times.py checks
+// shapes, load.py values.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "experiments/study/raw_times.hpp"
+#include "experiments/study/resamples.hpp"
 
 namespace {
 

@@ -10,6 +10,7 @@
 #include "core/base/counters.hpp"
 #include "experiments/common/text.hpp"
 #include "experiments/results/table.hpp"
+#include "experiments/study/resamples.hpp"
 #include "experiments/study/times_record.hpp"
 
 namespace kbvh::experiments {

@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "experiments/study/chance.hpp"
+#include "experiments/study/resamples.hpp"
 
 namespace kbvh::experiments {
 

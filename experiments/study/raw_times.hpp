@@ -1,6 +1,4 @@
 #pragma once
-#include <array>
-#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -49,11 +47,10 @@ using Draw = std::vector<std::uint32_t>;
 Draw every_repetition(std::size_t repetitions);
 
 /// Returns the time of a phase in ms per frame, over the drawn repetitions. Phases: motion, update,
-/// traversal, triangle_tests, plan_changes, geometry_changes, changes (both), query (traversal +
-/// triangle_tests), upkeep (update + changes), candidates (upkeep + traversal), total (candidates +
-/// triangle_tests), and upkeep_with_motion and total_with_motion. The total and the motion are computed as
-/// `by` requires; the phases of the total are the medians of their sums, scaled to the total. Returns 0 for
-/// steady times if there are none.
+/// traversal, triangle_tests, plan_changes, geometry_changes, changes (both), query (traversal and tests),
+/// upkeep (update + changes), candidates (upkeep + traversal), total (candidates + triangle_tests); with
+/// motion: upkeep_with_motion, total_with_motion. Total and motion are computed as `by` requires; phases of
+/// the total are the medians of their sums, scaled to it. Returns 0 for steady times if there are none.
 double time_of(const RawTimes& times, std::string_view phase, Part part, By by,
                std::span<const std::uint32_t> draw);
 /// Does the same over all repetitions.
@@ -63,7 +60,6 @@ double time_of(const RawTimes& times, std::string_view phase, Part part = Part::
 std::vector<double> replicates(const RawTimes& times, std::string_view phase, Part part, By by);
 /// Whether repetitions of two contestants belong to the same rounds, and are therefore drawn together.
 enum class Rounds : std::uint8_t { same, others };
-Rounds rounds_of(const RawTimes& one, const RawTimes& other);
 /// Returns the middle 95 % of the quotients of replicates. Replicates of different rounds are paired in
 /// reversed order, which makes their draws independent.
 std::pair<double, double> middle_of_quotients(const std::vector<double>& above,
@@ -90,45 +86,6 @@ struct TimeOf {
   std::string_view phase;
 };
 std::optional<RatioOfTimes> ratio_of(const TimeOf& numerator, const TimeOf& denominator,
-                                     Part part = Part::clip);
-
-/// Sums of frames over several draws of one contestant's repetitions, each made when a phase first needs it.
-class DrawnTimes {
- public:
-  /// `times` must outlive the object, and have the part.
-  DrawnTimes(const RawTimes& times, Part part, By by, std::vector<Draw> draws)
-      : times_(&times), part_(part), by_(by), draws_(std::move(draws)) {}
-  /// Returns the time of a phase over each draw, in ms per frame (time_of).
-  std::vector<double> of(std::string_view phase);
-
- private:
-  const std::vector<double>& motions();
-  const std::vector<double>& totals();
-  const std::vector<PhaseTimes>& middles();
-
-  const RawTimes* times_;
-  Part part_;
-  By by_;
-  std::vector<Draw> draws_;
-  std::vector<double> motions_, totals_;
-  std::vector<PhaseTimes> middles_;  // medians of sums
-};
-
-/// The resamples of one contestant, kept for the next phase or ratio.
-class Resamples {
- public:
-  /// `times` must outlive the object.
-  explicit Resamples(const RawTimes& times) : times_(&times) {}
-  const RawTimes& times() const { return *times_; }
-  /// Returns what the function replicates() returns.
-  std::vector<double> replicates(std::string_view phase, Part part, By by);
-
- private:
-  const RawTimes* times_;
-  std::array<std::optional<DrawnTimes>, 4> known_;  // by part and by
-};
-/// Does the same, with the resamples that are known.
-std::optional<RatioOfTimes> ratio_of(Resamples& numerator, Resamples& denominator, std::string_view phase,
                                      Part part = Part::clip);
 
 /// Returns the first frame at which a contestant has paid for its preparation and its beginning: from there
