@@ -18,7 +18,8 @@ from pathlib import Path
 
 from results.files import ResultError
 
-NAME = "clip_times.so"
+#: Not clip_times.so: Python would take it for the module clip_times.
+NAME = "libclip_times.so"
 #: Each file of the sources, below the root of the tree.
 SOURCES = (
     "analysis/results/clip_times.cpp", "experiments/study/raw_times.cpp", "experiments/study/raw_times.hpp",

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import shutil
+import subprocess
+import sys
 import tempfile
 import unittest
 from pathlib import Path
@@ -37,7 +39,7 @@ class TestCompiled(unittest.TestCase):
     def test_is_kept_until_a_source_changes(self) -> None:
         first = arithmetic.compiled(self.root)
         self.assertEqual(first.parent, self.root / "build" / "clip_times")
-        with mock.patch("subprocess.run", side_effect=AssertionError("compiled again")):
+        with mock.patch.object(subprocess, "run", side_effect=AssertionError("compiled again")):
             self.assertEqual(arithmetic.compiled(self.root), first)
         (self.root / arithmetic.SOURCES[0]).write_text("#error changed\n")
         with self.assertRaisesRegex(ResultError, "could not compile(.|\n)*changed"):
@@ -65,6 +67,19 @@ class TestCompiled(unittest.TestCase):
         (self.root / arithmetic.SOURCES[0]).unlink()
         with self.assertRaisesRegex(ResultError, f"neither .*{arithmetic.NAME} nor its source .*clip_times.cpp"):
             arithmetic.compiled(self.root)
+
+
+class TestInstalled(unittest.TestCase):
+    def test_the_library_next_to_the_modules_is_used_and_hides_none_of_them(self) -> None:
+        with tempfile.TemporaryDirectory(prefix="kbvh-analysis-") as place:
+            shutil.copytree(ROOT / "analysis" / "results", Path(place) / "results")
+            made = Path(place) / "results" / arithmetic.NAME
+            shutil.copy(arithmetic.library()._name, made)
+            said = subprocess.run(
+                [sys.executable, "-c", "from results import arithmetic, clip_times; print(arithmetic.library()._name, clip_times.DRAWS)"],
+                cwd=place, capture_output=True, text=True, check=True,
+            ).stdout  # fmt: skip
+            self.assertEqual(said.split(), [str(made), "200"])
 
 
 class TestTables(unittest.TestCase):
