@@ -1,6 +1,6 @@
 """The data of the explorer: results as columns, small enough to lie in the page, and nothing that the page cannot show.
 
-The page computes ratios, intervals and profiles from the times of all repetitions; ratios.py and profiles.py define them, and
+The page computes ratios, intervals and profiles from the times of all repetitions; raw_times.cpp and profiles.py define them, and
 a test compares the two.
 """
 
@@ -18,7 +18,7 @@ from claims import claim_pictures, claims as paper_claims
 from figures import colours
 from ratios import profiles
 from results import clip_times, text
-from results.load import PHASES, Study
+from results.load import PHASES, SUMS, Study
 
 SCHEMA = "kbvh-explorer-1"
 
@@ -33,7 +33,7 @@ COUNTERS = ("certificates_failed", "values_written", "nodes_visited", "box_tests
 COLUMNS = ("cell", "contestant", "session", "plan", "when", "kind", "repetitions", "limit", "every", "rounds", *NUMBERS, *COUNTERS, "refused",
            "disturbed", "clips", "times", "middle", "draws", "pace", "quality")  # fmt: skip
 #: The sums of phases that the page has for each resample of the rounds.
-DRAWN = (("motion",), ("update", "plan_changes"), ("traversal", "triangle_tests"))
+DRAWN = ("motion", "upkeep", "query")
 
 
 def number(value: Any, digits: Optional[int] = None) -> Optional[float]:
@@ -89,7 +89,7 @@ def data(study: Study, title: str, claims: Optional[paper_claims.Claims], folder
         raw = study.raw.get(int(row["run"]))
         columns["disturbed"].append(row["disturbed"])
         columns["clips"].append(raw is None or raw.by_clips)
-        columns["middle"].append([] if raw is None else [number(clip_times.time_of(raw, (phase,), False)) for phase in PHASES])
+        columns["middle"].append([] if raw is None else [number(clip_times.time_of(raw, SUMS[phase], False)) for phase in PHASES])
         columns["draws"].append([] if raw is None else _draws(raw))
         again = row["again"]
         columns["limit"].append(again.get("frames_limit", _limit(row)))
@@ -126,7 +126,7 @@ def _draws(raw: clip_times.RawTimes) -> list[list[Optional[float]]]:
     clips, whose resamples the page makes from their repetitions."""
     if raw.by_clips or raw.repetitions < clip_times.FEWEST_OF_AN_INTERVAL:
         return []
-    return [[number(v, 5) for v in clip_times.replicates(raw, phases)] for phases in DRAWN]
+    return [[number(v, 5) for v in clip_times.replicates(raw, phase)] for phase in DRAWN]
 
 
 def _limit(row: pd.Series) -> int:

@@ -13,7 +13,8 @@ import pandas as pd
 from .scenes import PathLike
 
 _SHARED = (
-    "results", "results.files", "results.scene_names", "results.clip_times", "results.load", "ratios", "ratios.ratios", "ratios.profiles",
+    "results", "results.files", "results.scene_names", "results.arithmetic", "results.clip_times", "results.record", "results.rows",
+    "results.load", "ratios", "ratios.ratios", "ratios.profiles",
 )  # fmt: skip
 
 

@@ -10,15 +10,10 @@ import numpy as np
 import pandas as pd
 
 from results import clip_times
-from results.load import PHASES, Study
+from results.load import Study
 
-#: The phases of a ratio.
-SCOPES: dict[str, tuple[str, ...]] = {
-    "with_motion": PHASES,
-    "without_motion": tuple(name for name in PHASES if name != "motion"),
-    "update": ("update", "plan_changes"),
-    "query": ("traversal", "triangle_tests"),
-}
+#: The phase of a ratio, by the program's name (clip_times).
+SCOPES = {"with_motion": "total_with_motion", "without_motion": "total", "update": "upkeep", "query": "query"}
 
 
 @dataclass(frozen=True)
@@ -27,11 +22,6 @@ class Ratio(clip_times.Ratio):
 
     reference: int
     disturbed: bool  #: on one of the sides
-
-
-def times_of(study: Study, run: int, scope: str) -> np.ndarray:
-    """Returns the time per frame in ms of each repetition of a run, over the phases of a scope."""
-    return study.times(SCOPES[scope]).get(run, np.empty(0))
 
 
 def clip_total(study: Study, run: int) -> float:

@@ -1,22 +1,25 @@
-"""The arithmetic of times: from the raw times of repetitions to one number, and how sure a ratio is.
+"""From the raw times of repetitions to one number, and how sure a ratio is; experiments/RESULTS.md says why.
 
-The same as experiments/study/raw_times.cpp; experiments/RESULTS.md says why.
+The program's own code computes (experiments/study/raw_times.hpp); this module hands it tables and returns its numbers. Phases
+have the program's names: motion, update, traversal, triangle_tests, changes, query, upkeep (update and changes), total, and
+upkeep_with_motion and total_with_motion.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import ctypes
+import weakref
 from dataclasses import dataclass, field
-from functools import lru_cache
-from typing import Optional
+from typing import Any, Optional
 
 import numpy as np
 
+from results import arithmetic
+
 #: Phases of the total, as columns of sums; the motion is apart.
-PARTS = ("update", "traversal", "triangle_tests", "plan_changes")
+PARTS = ("update", "traversal", "triangle_tests", "plan_changes", "geometry_changes")
 FEWEST_OF_AN_INTERVAL = 5
 DRAWS = 200
-LEFT_OUT = DRAWS // 40
 
 
 @dataclass
@@ -35,81 +38,60 @@ class RawTimes:
     by_clips: bool
     session: str
     disturbed: str = ""
-    _known: dict[tuple[bool, bool], tuple[np.ndarray, np.ndarray, np.ndarray]] = field(default_factory=dict, repr=False)
+    _handle: Optional[int] = field(default=None, repr=False, compare=False)
 
     @property
     def repetitions(self) -> int:
         """The number of repetitions."""
         return len(self.totals)
 
-    def resampled(self, by_clips: bool, steady: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Returns motion, total and shares of the total ([PARTS]) of every resample; made once."""
-        key = (by_clips, steady)
-        if key not in self._known:
-            draws = resamples(self.repetitions)
-            most = max(1, 4_000_000 // self.totals.size)  # at once
-            found = [_combined(self, draws[begin : begin + most], by_clips, steady) for begin in range(0, DRAWS, most)]
-            motion, total, shares = (np.concatenate(list(one)) for one in zip(*found))
-            self._known[key] = (motion, total, shares)
-        return self._known[key]
+    @property
+    def handle(self) -> int:
+        """The program's object with these times, made once, with the resamples that it has computed."""
+        if self._handle is None:
+            library = arithmetic.library()
+            of_rounds, frames = self.totals.shape
+            begin = -1 if self.steady_from is None else self.steady_from
+            tables = [
+                _doubles(table, (of_rounds, columns))
+                for table, columns in ((self.totals, frames), (self.motions, frames), (self.sums, len(PARTS)), (self.steady_sums, len(PARTS)))
+            ]
+            pointers = [None if table is None else table.ctypes.data for table in tables]
+            self._handle = library.kbvh_times_new(of_rounds, frames, *pointers, begin, self.by_clips, self.session.encode())
+            weakref.finalize(self, library.kbvh_times_delete, self._handle)
+        return self._handle
 
 
-def _combined(times: RawTimes, draws: np.ndarray, by_clips: bool, steady: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    begin = times.steady_from if steady else 0
-    frames = times.totals.shape[1] - begin
-
-    def of(table: np.ndarray) -> np.ndarray:
-        part = table[:, begin:]
-        if by_clips:
-            return np.median(part.sum(axis=1)[draws], axis=1) / frames
-        return np.median(part[draws], axis=1).sum(axis=1) / frames
-
-    sums = times.steady_sums if steady else times.sums
-    middle = np.median(sums[draws], axis=1)
-    whole = middle.sum(axis=1, keepdims=True)
-    return of(times.motions), of(times.totals), np.divide(middle, whole, out=np.zeros_like(middle), where=whole > 0)
+def _doubles(table: Optional[np.ndarray], shape: tuple[int, int]) -> Optional[np.ndarray]:
+    if table is None:
+        return None
+    if table.shape != shape:
+        raise ValueError(f"a table of times has the shape {table.shape}, but should have {shape}")
+    return np.ascontiguousarray(table, dtype=float)
 
 
-def _of_phases(found: tuple[np.ndarray, np.ndarray, np.ndarray], phases: Sequence[str]) -> np.ndarray:
-    motion, total, shares = found
-    inner = [PARTS.index(name) for name in phases if name != "motion"]
-    value = total if len(inner) == len(PARTS) else total * shares[:, inner].sum(axis=1)
-    return value + motion if "motion" in phases else value
+def _several(call: Any, times: RawTimes, phase: str, count: int) -> np.ndarray:
+    values = np.empty(count)
+    call(times.handle, phase.encode(), values.ctypes.data)
+    return values
 
 
-def time_of(times: RawTimes, phases: Sequence[str], by_clips: Optional[bool] = None, steady: bool = False) -> float:
-    """Returns the time of some phases in ms per frame, over all repetitions. By frames it is the sum of each frame's median
+def time_of(times: RawTimes, phase: str, by_clips: Optional[bool] = None, steady: bool = False) -> float:
+    """Returns the time of a phase in ms per frame, over all repetitions. By frames it is the sum of each frame's median
     (phases are scaled to that total), by clips the median of the repetitions' sums. NaN for steady times where there are none.
     """
-    if steady and times.steady_from is None:
-        return float("nan")
-    every = np.arange(times.repetitions)[None, :]
-    return float(_of_phases(_combined(times, every, times.by_clips if by_clips is None else by_clips, steady), phases)[0])
+    by_clips = times.by_clips if by_clips is None else by_clips
+    return float(arithmetic.library().kbvh_times_of(times.handle, phase.encode(), steady, by_clips))
 
 
-def replicates(times: RawTimes, phases: Sequence[str], by_clips: bool = False, steady: bool = False) -> np.ndarray:
-    """Returns the time over each resample of the rounds."""
-    return _of_phases(times.resampled(by_clips, steady), phases)
+def replicates(times: RawTimes, phase: str) -> np.ndarray:
+    """Returns the time over each resample of the rounds, by frames."""
+    return _several(arithmetic.library().kbvh_times_replicates, times, phase, DRAWS)
 
 
-def single_times(times: RawTimes, phases: Sequence[str]) -> np.ndarray:
+def single_times(times: RawTimes, phase: str) -> np.ndarray:
     """Returns the time of each repetition alone."""
-    return _of_phases(_combined(times, np.arange(times.repetitions)[:, None], times.by_clips, False), phases)
-
-
-@lru_cache(maxsize=None)
-def resamples(repetitions: int) -> np.ndarray:
-    """Returns the resampled rounds, [draw][repetition]: the same on every machine and in the program (Steele, Lea and Flood 2014)."""
-    state, mask, found = 1, (1 << 64) - 1, []
-    for _ in range(DRAWS):
-        draw = []
-        for _ in range(repetitions):
-            state = x = (state + 0x9E3779B97F4A7C15) & mask
-            x = ((x ^ (x >> 30)) * 0xBF58476D1CE4E5B9) & mask
-            x = ((x ^ (x >> 27)) * 0x94D049BB133111EB) & mask
-            draw.append(((x ^ (x >> 31)) >> 32) * repetitions >> 32)
-        found.append(draw)
-    return np.array(found)
+    return _several(arithmetic.library().kbvh_times_single, times, phase, times.repetitions)
 
 
 @dataclass(frozen=True)
@@ -125,35 +107,14 @@ class Ratio:
     is_interval: bool
 
 
-def ratio_of(numerator: RawTimes, denominator: RawTimes, phases: Sequence[str], steady: bool = False) -> Optional[Ratio]:
+def ratio_of(numerator: RawTimes, denominator: RawTimes, phase: str, steady: bool = False) -> Optional[Ratio]:
     """Returns the ratio of two times; None if one of them is 0 or unknown. If one counts by clips, both do."""
-    by_clips = numerator.by_clips or denominator.by_clips
-    top, bottom = (time_of(side, phases, by_clips, steady) for side in (numerator, denominator))
-    if not (top > 0 and bottom > 0):
-        return None
-    n, m = numerator.repetitions, denominator.repetitions
-    paired = n == m and numerator.session == denominator.session
-    middle = top / bottom
-    if min(n, m) >= FEWEST_OF_AN_INTERVAL:
-        above = replicates(numerator, phases, by_clips, steady)
-        below = replicates(denominator, phases, by_clips, steady)
-        # Reversed, the draws of other rounds are independent.
-        ends = np.sort(above / (below if paired else below[::-1]))
-        return Ratio(middle, min(float(ends[LEFT_OUT]), middle), max(float(ends[-1 - LEFT_OUT]), middle), paired, True)
-    above, below = (
-        _of_phases(_combined(side, np.arange(side.repetitions)[:, None], by_clips, steady), phases) for side in (numerator, denominator)
-    )
-    if min(n, m) < 2 or below.min() <= 0:
-        return Ratio(middle, middle, middle, paired, False)
-    each = above / below if paired else (above[:, None] / below[None, :]).ravel()
-    return Ratio(middle, min(float(each.min()), middle), max(float(each.max()), middle), paired, False)
+    found = (ctypes.c_double * 3)()
+    facts = arithmetic.library().kbvh_times_ratio(numerator.handle, denominator.handle, phase.encode(), steady, found)
+    return Ratio(*found, bool(facts & 2), bool(facts & 4)) if facts else None
 
 
 def paid_from(own: RawTimes, own_preparation: float, other: RawTimes, other_preparation: float) -> Optional[int]:
     """Returns the frame from which on preparation (ms) and frames so far take no longer than the other's; None if never."""
-    if own.totals.shape[1] != other.totals.shape[1] or own.totals.shape[1] < 2:
-        return None
-    ahead = other_preparation - own_preparation + np.cumsum(np.median(other.totals, axis=0) - np.median(own.totals, axis=0))
-    behind = np.flatnonzero(ahead < 0)
-    first = 0 if not len(behind) else int(behind[-1]) + 1
-    return first if first < len(ahead) else None
+    frame = arithmetic.library().kbvh_times_paid_from(own.handle, own_preparation, other.handle, other_preparation)
+    return None if frame < 0 else int(frame)

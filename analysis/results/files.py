@@ -11,6 +11,10 @@ from pathlib import Path
 from typing import Any, Union
 
 
+class ResultError(Exception):
+    """Reports an unusable result file in one sentence for the user."""
+
+
 def parse_json(content: str) -> Any:
     """Returns the value of a JSON text; raises ValueError for invalid JSON, including NaN, Infinity and excessive nesting.
     """

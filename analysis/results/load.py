@@ -7,10 +7,7 @@ line and the field; other missing fields read as unknown.
 from __future__ import annotations
 
 import json
-import math
-import sys
 from dataclasses import dataclass, field
-from datetime import datetime
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Optional
@@ -19,21 +16,13 @@ import numpy as np
 import pandas as pd
 
 from results import clip_times, files, scene_names
+from results.files import ResultError
+from results.record import Record
+from results.rows import PHASES, READ_COUNTERS, SCHEMA, raw_times_of, repetitions_of, row_of  # noqa: F401  (others import them from here)
 
-SCHEMA = 2
 #: Times of schema 1 leave out the beginning of the clip. They are shown, but in groups of their own.
 OLD_SCHEMA = 1
 FILE_NAME = "results.jsonl"
-PHASES = ("motion", "update", "traversal", "triangle_tests", "plan_changes")
-#: Counters that tables and figures read. Others become columns, too, if the results have them.
-READ_COUNTERS = ("certificates_failed", "values_written", "positions_fetched")
-#: Counters that are a level, not a sum over the clip.
-LEVELS = ("queue_peak", "list_peak", "most_nodes_searched")
-GUARANTEES = ("exact", "candidate_superset", "approximate")
-
-
-class ResultError(Exception):
-    """Reports an unusable result file in one sentence for the user."""
 
 
 def read_json(file: Path, schema: str, error: type[Exception]) -> dict[str, Any]:
@@ -61,7 +50,6 @@ class Study:
     repetitions: pd.DataFrame
     notes: list[str]
     raw: dict[int, clip_times.RawTimes] = field(default_factory=dict, repr=False, compare=False)
-    _times: dict[tuple[str, ...], dict[int, np.ndarray]] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def groups(self) -> list[pd.DataFrame]:
         """Returns the runs of each group, in the order of a report: scenes as in the file, then size, scalar and l."""
@@ -76,15 +64,6 @@ class Study:
         """The session of each run."""
         return dict(zip(map(int, self.runs["run"]), self.runs["session"]))
 
-    def times(self, phases: tuple[str, ...]) -> dict[int, np.ndarray]:
-        """Returns the time per frame in ms of each repetition of each run, over some phases; added up once for all callers."""
-        if phases not in self._times:
-            rows = self.repetitions.sort_values(["run", "repetition"])
-            sums = rows[list(phases)].sum(axis=1).to_numpy(dtype=float)
-            runs, starts = np.unique(rows["run"].to_numpy(), return_index=True)
-            self._times[phases] = {int(run): part for run, part in zip(runs, np.split(sums, starts[1:]))}
-        return self._times[phases]
-
     @property
     def timed(self) -> pd.DataFrame:
         """Returns runs with times: verified, not refused."""
@@ -94,49 +73,6 @@ class Study:
     def refused(self) -> pd.DataFrame:
         """Returns runs without times, each with its reason."""
         return self.runs[self.runs["refused"] != ""]
-
-
-_MISSING = object()
-
-
-class _Record:
-    """One line, with its place in the file for messages."""
-
-    def __init__(self, data: dict[str, Any], place: str) -> None:
-        self.data = data
-        self.place = place
-
-    def get(self, path: str, default: Any = _MISSING) -> Any:
-        value: Any = self.data
-        for step in path.split("."):
-            value = value.get(step, _MISSING) if isinstance(value, dict) else _MISSING
-            if value is _MISSING:
-                break
-        if value is _MISSING or (value is None and default is not _MISSING):
-            if default is _MISSING:
-                raise ResultError(f"{self.place}: the field {path} is missing.")
-            return default
-        return value
-
-    def text(self, path: str, default: Any = _MISSING) -> str:
-        value = self.get(path, default)
-        if not isinstance(value, str):
-            raise ResultError(f"{self.place}: {path} should be a text, but is {json.dumps(value)}.")
-        return value
-
-    def number(self, path: str, default: Any = _MISSING) -> float:
-        value = self.get(path, default)
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise ResultError(f"{self.place}: {path} should be a number, but is {json.dumps(value)}.")
-        if value is not default and not abs(value) <= sys.float_info.max:
-            raise ResultError(f"{self.place}: {path} is too large for a number.")
-        return float(value)
-
-    def flag(self, path: str, default: Any = _MISSING) -> bool:
-        value = self.get(path, default)
-        if not isinstance(value, bool):
-            raise ResultError(f"{self.place}: {path} should be true or false, but is {json.dumps(value)}.")
-        return value
 
 
 #: Of the runs with equal values in these columns, a report shows the newest.
@@ -172,17 +108,17 @@ def load(folder: Path, newest_of: tuple[str, ...] = ONE_OF_ALL_COMMITS) -> Study
         if not isinstance(data, dict) or "schema" not in data:
             notes.append(f"Line {index + 1} of {FILE_NAME} was skipped: it is no result.")
             continue
-        record = _Record(data, place)
+        record = Record(data, place)
         schema = record.get("schema")
         if schema not in (SCHEMA, OLD_SCHEMA) or isinstance(schema, bool):
             raise ResultError(
                 f"{place}: schema {json.dumps(schema)} is not known to this report, which reads schema {SCHEMA} and {OLD_SCHEMA}."
             )
         try:
-            row = _row(record, index)
-            times = _repetitions(record, index, row)
+            row = row_of(record, index)
+            times = repetitions_of(record, index, row)
             if times:
-                raw[index] = _raw(record, row, times)
+                raw[index] = raw_times_of(record, row)
         except ResultError as problem:
             notes.append(f"Line {index + 1} of {FILE_NAME} was skipped: {str(problem).removeprefix(place).lstrip(':, ')}")
             continue
@@ -213,260 +149,6 @@ def load(folder: Path, newest_of: tuple[str, ...] = ONE_OF_ALL_COMMITS) -> Study
             "the first frame), and are never compared with newer ones."
         )
     return Study(path, _with_times(runs, times, raw), times, notes, raw)
-
-
-def _row(record: _Record, index: int) -> dict[str, Any]:
-    """Flattens one record."""
-    counters = record.get("counters", {})
-    params = record.get("strategy.params", {})
-    builder = record.get("strategy.builder", None)
-    if not isinstance(counters, dict) or not isinstance(params, dict) or not isinstance(builder, (dict, type(None))):
-        raise ResultError(f"{record.place}: counters, strategy.params and strategy.builder should be objects.")
-    guarantee = record.text("strategy.guarantee")
-    if guarantee not in GUARANTEES:
-        raise ResultError(
-            f"{record.place}: strategy.guarantee is {json.dumps(guarantee)}, but should be one of {', '.join(GUARANTEES)}."
-        )
-    machine = {
-        name: str(record.get(f"machine.{name}", ""))
-        for name in ("cpu", "cores", "memory_gb", "os", "compiler", "flags", "build_type", "simd", "kernels")
-    }
-    if isinstance(record.get("machine.simd", ""), list):
-        machine["simd"] = ", ".join(map(str, record.get("machine.simd")))
-    holds = record.flag("verified.holds")
-    violation = record.text("verified.first_violation", "")
-    times = record.get("times", None)
-    refused = ""
-    if not holds:
-        refused = f"its declared guarantee or tightness is broken: {violation or 'no detail was recorded'}"
-    elif times is None:
-        refused = record.text("refused", "") or "no time was taken"
-    bodies = record.get("scene.bodies", [])
-    row: dict[str, Any] = {
-        "run": index,
-        "schema": int(record.number("schema")),
-        "key": str(record.get("key", "")),
-        "session": str(record.get("run", "")),
-        "kind": record.text("kind"),
-        "when": _time(record.text("when", "")),
-        "commit": record.text("commit", ""),
-        "dirty": record.flag("dirty", False),
-        **machine,
-        "seed": str(record.get("seed", "")),
-        "scene": scene_names.family(record.text("scene.name"), bodies),
-        "scene_name": record.text("scene.name"),
-        "origin": record.text("scene.origin", ""),
-        "changes": _changes(record),
-        "answer": record.text("scene.changes", ""),
-        "rays": record.text("scene.rays", ""),
-        "within": record.text("scene.within", ""),
-        "held_to": record.text("scene.kernels", ""),
-        "changed_per_frame": _changed_per_frame(record),
-        "hash": str(record.get("scene.hash", "")),
-        "card": str(record.get("scene.card", "")),
-        "scalar": record.text("scene.scalar"),
-        "l": record.number("scene.per_keyframe"),
-        "keyframes": record.number("scene.keyframes", math.nan),
-        "frames": record.number("scene.frames", math.nan),
-        "primitives": record.number("scene.primitives"),
-        "moving": _moving(bodies) or record.number("scene.primitives"),
-        "bodies": bodies if isinstance(bodies, list) else [],
-        "id": record.text("strategy.id"),
-        "tag": record.text("strategy.label", ""),
-        "title": record.text("strategy.title", record.text("strategy.id")),
-        "family": record.text("strategy.family", "unknown"),
-        # Records from before baselines were declared are classified by family.
-        "baseline": record.flag("strategy.baseline", record.text("strategy.family", "unknown") == "refit"),
-        "guarantee": guarantee,
-        "tightness": record.text("strategy.tightness", ""),
-        "foresight": record.text("strategy.foresight", ""),
-        "citation": record.text("strategy.citation", ""),
-        "about": record.text("strategy.about", ""),
-        "plan": _object(record, "plan"),
-        "again": _object(record, "again"),
-        "order": record.text("scene.order", ""),
-        "continuous": record.flag("scene.continuous", False),
-        "choice": record.text("choice", ""),
-        "own_scalar": record.text("strategy.own_scalar", ""),
-        "version": record.text("strategy.version", ""),
-        "instructions": _instructions(record, params, machine),
-        "remark": record.text("strategy.remark", ""),
-        "params": params,
-        "threads": _threads(params),
-        "builder": builder,
-        "over_time": _over_time(record),
-        "times_over_time": _times_over_time(record),
-        "events_at_depth": _list(record, "events_at_depth"),
-        "holds": holds,
-        "violation": violation,
-        "audited": record.flag("verified.audited", False),
-        "refused": refused,
-        "sampled_every": record.number("verified.sampled_every", 1),
-        "p50": record.number("times.total_p50", math.nan),
-        "p99": record.number("times.total_p99", math.nan),
-        "worst": record.number("times.total_worst", math.nan),
-        "build_ms": record.number("times.build_ms", math.nan),
-        "disturbed": record.text("times.disturbed", ""),
-        "bytes": record.number("bytes", math.nan),
-    }
-    for name in ("frames", "pairs", "candidates", "missed_candidates", "missed", "extra", "wrong_frames", "first_missed",
-                 "missed_depth", "missed_depth_mean", "missed_depth_in_edges", "repeated", "malformed", "protrusion", "looseness", "invalid", "not_tight"):  # fmt: skip
-        row["verified_frames" if name == "frames" else name] = record.number(f"verified.{name}", math.nan)
-    if not row["audited"]:  # a hierarchy that cannot be seen has no measured boxes, whatever was recorded
-        row["protrusion"] = row["looseness"] = math.nan
-    counters = record.get("counters", {})
-    for name in dict.fromkeys((*READ_COUNTERS, *(counters if isinstance(counters, dict) else ()))):
-        total = record.number(f"counters.{name}", math.nan)
-        row[f"{name}_per_frame"] = total if name in LEVELS or not row["frames"] > 0 else total / row["frames"]
-    row["contestant"] = _identity(row["id"], params, builder)
-    row["machine"] = " · ".join(
-        machine[name] for name in ("cpu", "os", "compiler", "flags", "build_type", "simd", "kernels") if machine[name]
-    )
-    row["group"] = json.dumps(
-        [row["scene_name"], row["hash"], row["primitives"], row["scalar"], row["l"], str(row["frames"]), row["machine"]]
-        + ([f"schema {row['schema']}"] if row["schema"] != SCHEMA else [])
-    )
-    return row
-
-
-def _time(text: str) -> str:
-    """Returns a time as kbvh writes it; empty for a day that does not exist: it would be the newest one.
-
-    >>> _time("2026-01-31T23:59:59Z"), _time("2999-13-45T00:00:00Z")
-    ('2026-01-31T23:59:59Z', '')
-    """
-    try:
-        return text if datetime.strptime(text, "%Y-%m-%dT%H:%M:%SZ") else ""
-    except ValueError:
-        return ""
-
-
-def _object(record: _Record, path: str) -> dict[str, Any]:
-    found = record.get(path, {})
-    if not isinstance(found, dict):
-        raise ResultError(f"{record.place}: {path} should be an object.")
-    return found
-
-
-def _list(record: _Record, path: str) -> list[Any]:
-    listed = record.get(path, [])
-    if not isinstance(listed, list):
-        raise ResultError(f"{record.place}: {path} should be a list.")
-    return listed
-
-
-def _over_time(record: _Record) -> list[dict[str, float]]:
-    """Returns the quality of the boxes at some times of the clip, if it can be compared with a rebuilt tree."""
-    samples = []
-    for entry in _list(record, "verified.over_time"):
-        one = _Record(entry if isinstance(entry, dict) else {}, f"{record.place}, verified.over_time")
-        sample = {name: one.number(name) for name in ("t", "looseness", "sah", "sah_rebuilt")}
-        if sample["sah"] > 0 and sample["sah_rebuilt"] > 0:
-            samples.append(sample)
-    return samples
-
-
-def _times_over_time(record: _Record) -> list[dict[str, float]]:
-    """Returns the times of equal parts of the clip; empty for results of older programs."""
-    parts = []
-    for entry in _list(record, "times.over_time"):
-        one = _Record(entry if isinstance(entry, dict) else {}, f"{record.place}, times.over_time")
-        parts.append({name: one.number(name) for name in ("begin", "update", "query")})
-    return parts
-
-
-def _changes(record: _Record) -> str:
-    """Describes the script of plan changes; empty without one."""
-    steps, changes = record.number("scene.script.steps", 0), record.number("scene.script.changes", 0)
-    return f"{changes:.0f} of single vertices, in {steps:.0f} frames" if changes else ""
-
-
-def _changed_per_frame(record: _Record) -> float:
-    """Returns the pairs that begin or end per frame; unknown unless answers were asked as changes."""
-    steps = record.number("scene.frames", math.nan) - 1
-    changed = record.number("changes.begun", math.nan) + record.number("changes.ended", math.nan)
-    return changed / steps if steps > 0 else math.nan
-
-
-def _moving(bodies: Any) -> float:
-    """Counts the primitives of moving bodies, as the paper does; 0 if unknown."""
-    listed = [body for body in bodies if isinstance(body, dict)] if isinstance(bodies, list) else []
-    counts = [body.get("primitives") for body in listed if body.get("moving") is True]
-    return float(sum(count for count in counts if isinstance(count, (int, float))))
-
-
-def _repetitions(record: _Record, index: int, row: dict[str, Any]) -> list[dict[str, float]]:
-    """Returns the repetitions of a record with times."""
-    if row["refused"]:
-        return []
-    unit = record.text("times.unit", "ms")
-    if unit != "ms":
-        raise ResultError(f'{record.place}: times are in "{unit}", but this report reads ms.')
-    listed = record.get("times.repetitions")
-    if not isinstance(listed, list) or not listed:
-        raise ResultError(f"{record.place}: times.repetitions should be a list with at least one entry.")
-    result = []
-    for number, entry in enumerate(listed):
-        one = _Record(entry if isinstance(entry, dict) else {}, f"{record.place}, repetition {number + 1}")
-        values = {name: one.number(name, 0.0 if name == "plan_changes" else _MISSING) for name in PHASES}
-        for name, value in values.items():
-            if not (math.isfinite(value) and value >= 0):
-                raise ResultError(f"{one.place}: {name} is {value}, which is not a time.")
-        # Both are the strategy's answers to changes at run time: every sum has them together.
-        values["plan_changes"] += one.number("geometry_changes", 0.0)
-        result.append({"run": index, "repetition": number, **values})
-    return result
-
-
-def _instructions(record: _Record, params: dict[str, Any], machine: dict[str, str]) -> str:
-    """Returns the instruction set of a contestant's code: a peer's own, the one it was held to, or that of kbvh's kernels in use."""
-    chosen = str(params.get("kernels", "auto"))
-    return record.text("strategy.instructions", "") or (chosen if chosen != "auto" else machine["kernels"])
-
-
-def _raw(record: _Record, row: dict[str, Any], means: list[dict[str, float]]) -> clip_times.RawTimes:
-    """Returns the raw times of a record with times, whose means per frame are known."""
-    sums = np.array([[one[name] for name in clip_times.PARTS] for one in means])
-    session, disturbed = row["session"], row["disturbed"]
-    listed = record.get("times.repetitions")
-    if not all(isinstance(one, dict) and "totals" in one for one in listed):
-        if row["schema"] == SCHEMA:
-            raise ResultError(f"{record.place}: times.repetitions: totals are missing.")
-        motions = np.array([[one["motion"]] for one in means])
-        return clip_times.RawTimes(sums.sum(axis=1, keepdims=True), motions, sums, None, None, True, session, disturbed)
-    try:
-        totals, motions = (np.array([one[name] for one in listed], dtype=float) for name in ("totals", "motions"))
-    except (KeyError, TypeError, ValueError) as problem:
-        raise ResultError(f"{record.place}: times.repetitions: totals and motions should be lists of numbers: {problem}.") from None
-    if totals.ndim != 2 or totals.shape != motions.shape or not totals.size or not np.isfinite([totals, motions]).all():
-        raise ResultError(f"{record.place}: times.repetitions: totals and motions should have a number for each frame.")
-    begin, steady = record.get("times.steady_from", None), None
-    if begin is not None:
-        if isinstance(begin, bool) or not isinstance(begin, int) or not 0 <= begin < totals.shape[1]:
-            raise ResultError(f"{record.place}: times.steady_from should be a frame.")
-        steady = []
-        for number, entry in enumerate(listed):
-            one = _Record(entry, f"{record.place}, repetition {number + 1}")
-            parts = [one.number(f"steady.{name}") for name in clip_times.PARTS]
-            parts[-1] += one.number("steady.geometry_changes", 0.0)
-            steady.append(parts)
-    by_clips = record.text("times.by", "frames") != "frames"
-    return clip_times.RawTimes(
-        totals, motions, sums, None if steady is None else np.array(steady), begin, by_clips, session, disturbed
-    )  # fmt: skip
-
-
-def _threads(params: dict[str, Any]) -> int:
-    """Returns the threads that a contestant shared its work among."""
-    try:
-        return max(1, int(float(params.get("threads", 1))))
-    except (TypeError, ValueError):
-        return 1
-
-
-def _identity(strategy: str, params: dict[str, Any], builder: Optional[dict[str, Any]]) -> str:
-    """Returns a text that is equal for equal configurations of a strategy."""
-    return strategy + json.dumps([params, builder], sort_keys=True)
 
 
 def _labels(runs: pd.DataFrame) -> pd.Series:
@@ -500,13 +182,14 @@ def _newest(runs: pd.DataFrame, columns: tuple[str, ...]) -> tuple[pd.DataFrame,
     return newest.reset_index(drop=True), len(runs) - len(newest)
 
 
-#: Times of runs, by the phases that they add up.
+#: Times of runs, with the program's names of what they add up.
 SUMS = {
-    **{name: (name,) for name in PHASES},
-    "query": ("traversal", "triangle_tests"),
-    "updating": ("update", "plan_changes"),
-    "total": clip_times.PARTS,
-    "total_motion": PHASES,
+    **{name: name for name in PHASES},
+    "plan_changes": "changes",
+    "query": "query",
+    "updating": "upkeep",
+    "total": "total",
+    "total_motion": "total_with_motion",
 }
 
 
@@ -515,9 +198,9 @@ def _with_times(runs: pd.DataFrame, times: pd.DataFrame, raw: dict[int, clip_tim
     total, and `middle_` and a phase: that phase in the repetition with the median total.
     """
     found = pd.DataFrame(
-        {name: [clip_times.time_of(one, phases) for one in raw.values()] for name, phases in SUMS.items()}, index=list(raw), dtype=float
+        {name: [clip_times.time_of(one, phase) for one in raw.values()] for name, phase in SUMS.items()}, index=list(raw), dtype=float
     )
-    found["steady"] = [clip_times.time_of(one, clip_times.PARTS, steady=True) for one in raw.values()]
+    found["steady"] = [clip_times.time_of(one, "total", steady=True) for one in raw.values()]
     sums = times.assign(total_motion=times[list(PHASES)].sum(axis=1))
     extremes = sums.groupby("run")["total_motion"].agg(["min", "max", "count", "median"])
     found["spread"] = (extremes["max"] - extremes["min"]) / extremes["median"].where(extremes["median"] > 0)

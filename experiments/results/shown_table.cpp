@@ -10,6 +10,7 @@
 #include "core/base/counters.hpp"
 #include "experiments/common/text.hpp"
 #include "experiments/results/table.hpp"
+#include "experiments/study/resamples.hpp"
 #include "experiments/study/times_record.hpp"
 
 namespace kbvh::experiments {
@@ -89,8 +90,10 @@ class Table {
   Table(const std::vector<json>& records, Shown shown)
       : records_(records), refit_(best_refit(records)), shown_(shown) {
     for (const json& record : records) times_.push_back(has_times(record) ? raw_times(record) : RawTimes{});
-    for (std::size_t i = 0; i < records.size(); ++i)
-      if (&records[i] == refit_) refit_times_ = &times_[i];
+    for (std::size_t i = 0; i < records.size(); ++i) {
+      resamples_.emplace_back(times_[i]);
+      if (&records[i] == refit_) refit_place_ = i;
+    }
   }
 
   std::string text();
@@ -102,6 +105,7 @@ class Table {
   void keep_the_fastest();
   Rows speeds() const;
   Rows details() const;
+  std::optional<RatioOfTimes> ratio(std::size_t i, const char* phase, Part part = Part::clip) const;
   std::string paid_cell(std::size_t i) const;
   std::string ratio_cell(std::size_t i, const char* phase, Part part) const;
   std::string within_cell(std::size_t i, bool beside_intervals) const;
@@ -112,7 +116,8 @@ class Table {
   const json* refit_;
   const Shown shown_;
   std::vector<RawTimes> times_;
-  const RawTimes* refit_times_ = nullptr;
+  mutable std::vector<Resamples> resamples_;  // of times_
+  std::optional<std::size_t> refit_place_;
   std::vector<std::size_t> rows_;  // of the records, the fastest first, those without times last
   std::map<std::string, std::size_t> family_sizes_;
   std::string text_;
@@ -158,9 +163,9 @@ void Table::order() {
     ++family_sizes_[family_of(records_[i])];
     if (!has_times(records_[i])) continue;
     key[i] = -time_of(times_[i], "total");
-    if (refit_times_ == nullptr) continue;
-    const auto ratio = ratio_of({*refit_times_, "total"}, {times_[i], "total"}, Part::clip);
-    key[i] = ratio ? ratio->middle : 0;
+    if (!refit_place_) continue;
+    const auto of_total = ratio(i, "total");
+    key[i] = of_total ? of_total->middle : 0;
   }
   rows_.resize(records_.size());
   std::iota(rows_.begin(), rows_.end(), std::size_t(0));
@@ -185,27 +190,32 @@ void Table::keep_the_fastest() {
   std::erase_if(rows_, [&](std::size_t i) { return kept.count(i) == 0 && &records_[i] != refit_; });
 }
 
+/// Returns the best refit's time over that of a record; nothing without one of them.
+std::optional<RatioOfTimes> Table::ratio(std::size_t i, const char* phase, Part part) const {
+  if (!refit_place_) return {};
+  return ratio_of(resamples_[*refit_place_], resamples_[i], phase, part);
+}
+
 std::string Table::ratio_cell(std::size_t i, const char* phase, Part part) const {
-  if (refit_times_ == nullptr) return "-";
-  const auto ratio = ratio_of({*refit_times_, phase}, {times_[i], phase}, part);
-  if (!ratio) return "-";
+  const auto found = ratio(i, phase, part);
+  if (!found) return "-";
   const bool doubtful = !disturbed(records_[i]).empty() || !disturbed(*refit_).empty();
-  return fmt::format("{:.3g}{}", ratio->middle, doubtful ? "?" : "");
+  return fmt::format("{:.3g}{}", found->middle, doubtful ? "?" : "");
 }
 
 std::string Table::within_cell(std::size_t i, bool beside_intervals) const {
-  if (refit_times_ == nullptr || &records_[i] == refit_) return "-";
-  const auto ratio = ratio_of({*refit_times_, "total"}, {times_[i], "total"});
-  if (!ratio || !ratio->within) return "-";
-  const std::string text = fmt::format("{:.3g} to {:.3g}", ratio->within->low, ratio->within->high);
-  return beside_intervals && !ratio->within->is_interval ? "[" + text + "]" : text;
+  if (&records_[i] == refit_) return "-";
+  const auto found = ratio(i, "total");
+  if (!found || !found->within) return "-";
+  const std::string text = fmt::format("{:.3g} to {:.3g}", found->within->low, found->within->high);
+  return beside_intervals && !found->within->is_interval ? "[" + text + "]" : text;
 }
 
 std::string Table::paid_cell(std::size_t i) const {
   if (refit_ == nullptr || &records_[i] == refit_) return "-";
   const json &own = records_[i].at("times"), &other = refit_->at("times");
   if (!own.contains("build_ms") || !other.contains("build_ms")) return "-";
-  const auto frame = paid_from(times_[i], own.at("build_ms").get<double>(), *refit_times_,
+  const auto frame = paid_from(times_[i], own.at("build_ms").get<double>(), times_[*refit_place_],
                                other.at("build_ms").get<double>());
   return frame ? std::to_string(*frame) : "never";
 }
@@ -217,8 +227,8 @@ Table::Rows Table::speeds() const {
     missed = missed || verified_count(records_[i], "missed") > 0;
     extra = extra || verified_count(records_[i], "extra") > 0;
     changes = changes || records_[i].at("scene").contains("changes");
-    if (refit_times_ == nullptr || times_[i].repetitions() < 2 || &records_[i] == refit_) continue;
-    const std::size_t fewest = std::min(times_[i].repetitions(), refit_times_->repetitions());
+    if (!refit_place_ || times_[i].repetitions() < 2 || &records_[i] == refit_) continue;
+    const std::size_t fewest = std::min(times_[i].repetitions(), times_[*refit_place_].repetitions());
     (fewest >= fewest_of_an_interval ? intervals : ranges) = true;
   }
   Rows rows{{"strategy", "x refit"}};

@@ -5,7 +5,7 @@
 namespace kbvh::experiments {
 
 /// A random generator (Steele, Lea and Flood 2014, "Fast splittable pseudorandom number generators"), the
-/// same on every machine and in analysis/ratios/ratios.py.
+/// same on every machine and in analysis/explorer/src/statistics.js.
 class Chance {
  public:
   explicit Chance(std::uint64_t seed) : state_(seed) {}

@@ -6,16 +6,17 @@
 #include <tuple>
 
 #include "experiments/study/chance.hpp"
+#include "experiments/study/resamples.hpp"
 
 namespace kbvh::experiments {
 
 namespace {
 
-constexpr std::size_t draws = 200, left_out = draws / 40;
+constexpr std::size_t draw_count = 200, left_out = draw_count / 40;
 
 std::vector<Draw> resamples(std::size_t repetitions) {
   Chance chance(1);
-  std::vector<Draw> all(draws, Draw(repetitions));
+  std::vector<Draw> all(draw_count, Draw(repetitions));
   for (Draw& draw : all)
     for (std::uint32_t& one : draw) one = chance.below(repetitions);
   return all;
@@ -29,24 +30,36 @@ double median_of(std::vector<double>& values) {
   return 0.5 * (*std::max_element(values.begin(), half) + *half);
 }
 
-double sum_by(const std::vector<std::vector<double>>& table, std::size_t begin, By by,
-              std::span<const std::uint32_t> draw) {
-  std::vector<double> values(draw.size());
-  if (by == By::clips) {
-    for (std::size_t i = 0; i < draw.size(); ++i)
-      values[i] = std::accumulate(table[draw[i]].begin() + std::ptrdiff_t(begin), table[draw[i]].end(), 0.0);
-    return median_of(values);
-  }
-  double sum = 0;
-  for (std::size_t f = begin; f < table[0].size(); ++f) {
-    for (std::size_t i = 0; i < draw.size(); ++i) values[i] = table[draw[i]][f];
-    sum += median_of(values);
-  }
-  return sum;
+std::size_t begin_of(const RawTimes& times, Part part) {
+  return part == Part::steady ? *times.steady_from : 0;
 }
 
-double median_sum(const std::vector<PhaseTimes>& sums, double PhaseTimes::*phase,
-                  std::span<const std::uint32_t> draw) {
+/// Returns the time per frame over each draw, from frame `begin` on.
+std::vector<double> sums_by(const std::vector<std::vector<double>>& table, std::size_t begin, By by,
+                            const std::vector<Draw>& draws) {
+  const auto frames = double(table[0].size() - begin);
+  std::vector<double> sums, of_clips, values;
+  if (by == By::clips)
+    for (const std::vector<double>& one : table)
+      of_clips.push_back(std::accumulate(one.begin() + std::ptrdiff_t(begin), one.end(), 0.0));
+  for (const Draw& draw : draws) {
+    values.resize(draw.size());
+    double sum = 0;
+    if (by == By::clips) {
+      for (std::size_t i = 0; i < draw.size(); ++i) values[i] = of_clips[draw[i]];
+      sum = median_of(values);
+    } else {
+      for (std::size_t f = begin; f < table[0].size(); ++f) {
+        for (std::size_t i = 0; i < draw.size(); ++i) values[i] = table[draw[i]][f];
+        sum += median_of(values);
+      }
+    }
+    sums.push_back(sum / frames);
+  }
+  return sums;
+}
+
+double median_sum(const std::vector<PhaseTimes>& sums, double PhaseTimes::*phase, const Draw& draw) {
   std::vector<double> values;
   for (const std::uint32_t r : draw) values.push_back(sums[r].*phase);
   return median_of(values);
@@ -60,32 +73,62 @@ Draw every_repetition(std::size_t repetitions) {
   return draw;
 }
 
+const std::vector<double>& DrawnTimes::motions() {
+  if (motions_.empty()) motions_ = sums_by(times_->motions, begin_of(*times_, part_), by_, draws_);
+  return motions_;
+}
+
+const std::vector<double>& DrawnTimes::totals() {
+  if (totals_.empty()) totals_ = sums_by(times_->totals, begin_of(*times_, part_), by_, draws_);
+  return totals_;
+}
+
+const std::vector<PhaseTimes>& DrawnTimes::middles() {
+  const std::vector<PhaseTimes>& sums = part_ == Part::steady ? times_->steady : times_->clip;
+  for (std::size_t i = middles_.size(); i < draws_.size(); ++i) {
+    PhaseTimes middle;
+    for (double PhaseTimes::*one : {&PhaseTimes::update, &PhaseTimes::traversal, &PhaseTimes::triangle_tests,
+                                    &PhaseTimes::plan_changes, &PhaseTimes::geometry_changes})
+      middle.*one = median_sum(sums, one, draws_[i]);
+    middles_.push_back(middle);
+  }
+  return middles_;
+}
+
+std::vector<double> DrawnTimes::of(std::string_view phase) {
+  if (phase == "motion") return motions();
+  constexpr std::string_view with_motion = "_with_motion";
+  if (phase.ends_with(with_motion)) {
+    std::vector<double> values = of(phase.substr(0, phase.size() - with_motion.size()));
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] += motions()[i];
+    return values;
+  }
+  if (phase == "total") return totals();
+  const auto share = [&](const PhaseTimes& middle) {
+    const double changes = middle.plan_changes + middle.geometry_changes;
+    return phase == "update"             ? middle.update
+           : phase == "traversal"        ? middle.traversal
+           : phase == "triangle_tests"   ? middle.triangle_tests
+           : phase == "plan_changes"     ? middle.plan_changes
+           : phase == "geometry_changes" ? middle.geometry_changes
+           : phase == "changes"          ? changes
+           : phase == "query"            ? middle.query()
+           : phase == "upkeep"           ? middle.update + changes
+           : phase == "candidates"       ? middle.update + middle.traversal + changes
+                                         : 0;
+  };
+  std::vector<double> values = totals();
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const PhaseTimes& middle = middles()[i];
+    values[i] = middle.total() > 0 ? values[i] * share(middle) / middle.total() : 0;
+  }
+  return values;
+}
+
 double time_of(const RawTimes& times, std::string_view phase, Part part, By by,
                std::span<const std::uint32_t> draw) {
   if (!times.has(part) || draw.empty()) return 0;
-  const std::size_t begin = part == Part::steady ? *times.steady_from : 0;
-  const auto frames = double(times.frames() - begin);
-  const auto motion = [&] { return sum_by(times.motions, begin, by, draw) / frames; };
-  const auto total = [&] { return sum_by(times.totals, begin, by, draw) / frames; };
-  if (phase == "motion") return motion();
-  if (phase == "total") return total();
-  if (phase == "total_with_motion") return total() + motion();
-  const std::vector<PhaseTimes>& sums = part == Part::steady ? times.steady : times.clip;
-  PhaseTimes middle;
-  for (double PhaseTimes::*one : {&PhaseTimes::update, &PhaseTimes::traversal, &PhaseTimes::triangle_tests,
-                                  &PhaseTimes::plan_changes, &PhaseTimes::geometry_changes})
-    middle.*one = median_sum(sums, one, draw);
-  const double changes = middle.plan_changes + middle.geometry_changes;
-  const double share = phase == "update"             ? middle.update
-                       : phase == "traversal"        ? middle.traversal
-                       : phase == "triangle_tests"   ? middle.triangle_tests
-                       : phase == "plan_changes"     ? middle.plan_changes
-                       : phase == "geometry_changes" ? middle.geometry_changes
-                       : phase == "query"            ? middle.query()
-                       : phase == "upkeep"           ? middle.update + changes
-                       : phase == "candidates"       ? middle.update + middle.traversal + changes
-                                                     : 0;
-  return middle.total() > 0 ? total() * share / middle.total() : 0;
+  return DrawnTimes(times, part, by, {Draw(draw.begin(), draw.end())}).of(phase)[0];
 }
 
 double time_of(const RawTimes& times, std::string_view phase, Part part) {
@@ -93,45 +136,55 @@ double time_of(const RawTimes& times, std::string_view phase, Part part) {
 }
 
 std::vector<double> replicates(const RawTimes& times, std::string_view phase, Part part, By by) {
-  std::vector<double> values;
-  for (const Draw& draw : resamples(times.repetitions()))
-    values.push_back(time_of(times, phase, part, by, draw));
-  return values;
+  return Resamples(times).replicates(phase, part, by);
+}
+
+std::vector<double> Resamples::replicates(std::string_view phase, Part part, By by) {
+  std::optional<DrawnTimes>& known = known_[2 * std::size_t(part) + std::size_t(by)];
+  if (!times_->has(part)) return std::vector<double>(draw_count, 0.0);
+  if (!known) known.emplace(*times_, part, by, resamples(times_->repetitions()));
+  return known->of(phase);
+}
+
+Rounds rounds_of(const RawTimes& one, const RawTimes& other) {
+  return one.repetitions() == other.repetitions() && one.session == other.session ? Rounds::same
+                                                                                  : Rounds::others;
 }
 
 std::pair<double, double> middle_of_quotients(const std::vector<double>& above,
                                               const std::vector<double>& below, Rounds rounds) {
   std::vector<double> ratios;
-  for (std::size_t i = 0; i < draws; ++i)
-    ratios.push_back(above[i] / below[rounds == Rounds::same ? i : draws - 1 - i]);
+  for (std::size_t i = 0; i < draw_count; ++i)
+    ratios.push_back(above[i] / below[rounds == Rounds::same ? i : draw_count - 1 - i]);
   std::sort(ratios.begin(), ratios.end());
   return {ratios[left_out], ratios[ratios.size() - 1 - left_out]};
 }
 
-std::optional<RatioOfTimes> ratio_of(const TimeOf& numerator, const TimeOf& denominator, Part part) {
-  const RawTimes &above = numerator.times, &below = denominator.times;
+namespace {
+
+std::optional<RatioOfTimes> ratio_of(Resamples& numerator, std::string_view phase_above,
+                                     Resamples& denominator, std::string_view phase_below, Part part) {
+  const RawTimes &above = numerator.times(), &below = denominator.times();
   const By by = above.by == By::clips || below.by == By::clips ? By::clips : By::frames;
-  const auto value = [&](const TimeOf& side, std::span<const std::uint32_t> draw) {
-    return time_of(side.times, side.phase, part, by, draw);
-  };
   const std::size_t n = above.repetitions(), m = below.repetitions();
-  const double top = value(numerator, every_repetition(n)), bottom = value(denominator, every_repetition(m));
+  const double top = time_of(above, phase_above, part, by, every_repetition(n)),
+               bottom = time_of(below, phase_below, part, by, every_repetition(m));
   if (!(top > 0) || !(bottom > 0)) return {};
   RatioOfTimes ratio{top / bottom, {}};
   if (n < 2 || m < 2) return ratio;
-  const bool paired = n == m && above.session == below.session;
   const bool is_interval = n >= fewest_of_an_interval && m >= fewest_of_an_interval;
   double low = ratio.middle, high = ratio.middle;
   if (is_interval) {
-    std::tie(low, high) = middle_of_quotients(replicates(above, numerator.phase, part, by),
-                                              replicates(below, denominator.phase, part, by),
-                                              paired ? Rounds::same : Rounds::others);
+    std::tie(low, high) =
+        middle_of_quotients(numerator.replicates(phase_above, part, by),
+                            denominator.replicates(phase_below, part, by), rounds_of(above, below));
   } else {
     for (std::uint32_t i = 0; i < n; ++i)
       for (std::uint32_t j = 0; j < m; ++j) {
-        if (paired && i != j) continue;
+        if (rounds_of(above, below) == Rounds::same && i != j) continue;
         const std::uint32_t one[] = {i}, other[] = {j};
-        const double quotient = value(numerator, one) / value(denominator, other);
+        const double quotient =
+            time_of(above, phase_above, part, by, one) / time_of(below, phase_below, part, by, other);
         low = std::min(low, quotient);
         high = std::max(high, quotient);
       }
@@ -140,6 +193,18 @@ std::optional<RatioOfTimes> ratio_of(const TimeOf& numerator, const TimeOf& deno
   const Within within{std::min(low, ratio.middle), std::max(high, ratio.middle), is_interval};
   if (std::isfinite(within.low) && std::isfinite(within.high)) ratio.within = within;
   return ratio;
+}
+
+}  // namespace
+
+std::optional<RatioOfTimes> ratio_of(const TimeOf& numerator, const TimeOf& denominator, Part part) {
+  Resamples above(numerator.times), below(denominator.times);
+  return ratio_of(above, numerator.phase, below, denominator.phase, part);
+}
+
+std::optional<RatioOfTimes> ratio_of(Resamples& numerator, Resamples& denominator, std::string_view phase,
+                                     Part part) {
+  return ratio_of(numerator, phase, denominator, phase, part);
 }
 
 std::optional<std::size_t> paid_from(const RawTimes& own, double own_preparation, const RawTimes& other,

@@ -47,10 +47,10 @@ using Draw = std::vector<std::uint32_t>;
 Draw every_repetition(std::size_t repetitions);
 
 /// Returns the time of a phase in ms per frame, over the drawn repetitions. Phases: motion, update,
-/// traversal, triangle_tests, plan_changes, geometry_changes, query (traversal + triangle_tests), upkeep
-/// (update and changes), candidates (upkeep + traversal), total (candidates + triangle_tests),
-/// total_with_motion. The total and the motion are computed as `by` requires; the phases of the total are the
-/// medians of their sums, scaled to the total. Returns 0 for steady times if there are none.
+/// traversal, triangle_tests, plan_changes, geometry_changes, changes (both), query (traversal and tests),
+/// upkeep (update + changes), candidates (upkeep + traversal), total (candidates + triangle_tests); with
+/// motion: upkeep_with_motion, total_with_motion. Total and motion are computed as `by` requires; phases of
+/// the total are the medians of their sums, scaled to it. Returns 0 for steady times if there are none.
 double time_of(const RawTimes& times, std::string_view phase, Part part, By by,
                std::span<const std::uint32_t> draw);
 /// Does the same over all repetitions.

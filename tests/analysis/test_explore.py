@@ -49,7 +49,7 @@ class TestInterval(unittest.TestCase):
     @staticmethod
     def raw(values: np.ndarray, session: str = "s") -> clip_times.RawTimes:
         """Repetitions of one frame each, all of it update."""
-        sums = np.column_stack([values, *[np.zeros(len(values))] * 3])
+        sums = np.column_stack([values, *[np.zeros(len(values))] * 4])
         return clip_times.RawTimes(values[:, None], np.zeros((len(values), 1)), sums, None, None, False, session)
 
     def test_is_about_the_limit_of_many_draws(self) -> None:
@@ -62,7 +62,7 @@ class TestInterval(unittest.TestCase):
                 "t": np.median(other[picks[0]], axis=1) / np.median(own[picks[1]], axis=1),
             }
             for session, values in drawn.items():
-                found = clip_times.ratio_of(self.raw(other, session), self.raw(own), clip_times.PARTS)
+                found = clip_times.ratio_of(self.raw(other, session), self.raw(own), "total")
                 assert found is not None
                 self.assertTrue(found.is_interval)
                 # 200 draws: each end has about the share of the distribution beyond it that it should have.
@@ -72,12 +72,12 @@ class TestInterval(unittest.TestCase):
                 self.assertGreaterEqual(np.mean(values >= found.high - 1e-12), 0.003, (n, session))
 
     def test_single_repetitions_have_no_spread(self) -> None:
-        found = clip_times.ratio_of(self.raw(np.array([2.0])), self.raw(np.array([1.0])), clip_times.PARTS)
+        found = clip_times.ratio_of(self.raw(np.array([2.0])), self.raw(np.array([1.0])), "total")
         self.assertEqual((found.middle, found.low, found.high, found.is_interval), (2.0, 2.0, 2.0, False))
-        self.assertIsNone(clip_times.ratio_of(self.raw(np.array([2.0])), self.raw(np.array([0.0])), clip_times.PARTS))
+        self.assertIsNone(clip_times.ratio_of(self.raw(np.array([2.0])), self.raw(np.array([0.0])), "total"))
 
     def test_few_repetitions_have_their_range(self) -> None:
-        found = clip_times.ratio_of(self.raw(np.array([2.0, 4.0, 3.0])), self.raw(np.ones(3)), clip_times.PARTS)
+        found = clip_times.ratio_of(self.raw(np.array([2.0, 4.0, 3.0])), self.raw(np.ones(3)), "total")
         self.assertEqual((found.middle, found.low, found.high, found.is_interval), (3.0, 2.0, 4.0, False))
 
 

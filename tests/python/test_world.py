@@ -102,7 +102,7 @@ class Answers(unittest.TestCase):
                 world = kbvh.World([body], id, precision=precision)
                 found = world.within([[0.25, 0.25, 1], [0.25, 0.25, 1.5], [3, 4, 0]], [1, 1.5, 0.5])
                 self.assertEqual(found.tolist(), [(0, 0, 0), (1, 0, 0), (1, 0, 1)], id)
-                self.assertEqual(len(world.within([[0.25, 0.25, 1]], np.nextafter(np.float32(1), 0))), 0, id)
+                self.assertEqual(len(world.within([[0.25, 0.25, 1]], np.nextafter(np.float32(1), np.float32(0)))), 0, id)
         with self.assertRaisesRegex(ValueError, "radius -1"):
             world.within([[0, 0, 0]], -1)
         with self.assertRaisesRegex(ValueError, r"points are \[point\]\[3\]"):

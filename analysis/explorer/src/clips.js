@@ -1,4 +1,4 @@
-// From the raw times of repetitions to the numbers of the page, as analysis/results/clip_times.py.
+// From the raw times of repetitions to the numbers of the page, as experiments/study/raw_times.cpp.
 import { DRAWS, FEWEST_OF_AN_INTERVAL, median, resamples } from "./statistics.js";
 
 const PARTS = 4; // phases without the motion, which comes first

@@ -1,4 +1,4 @@
-// Ratios, intervals and profiles. analysis/ratios/ratios.py and analysis/ratios/profiles.py define them; a test compares both.
+// Ratios, intervals and profiles. experiments/study/raw_times.cpp and analysis/ratios/profiles.py define them; a test compares both.
 
 /** The phases of each measure that has repetitions. */
 export const SCOPES = {
@@ -31,7 +31,7 @@ export const DRAWS = 200;
 const LEFT_OUT = DRAWS / 40;
 const drawn = new Map();
 
-/** Returns the resampled rounds, the same as in analysis/results/clip_times.py (Steele, Lea and Flood 2014). */
+/** Returns the resampled rounds, the same as in experiments/study/raw_times.cpp (Steele, Lea and Flood 2014). */
 export function resamples(repetitions) {
   if (drawn.has(repetitions)) return drawn.get(repetitions);
   const mask = (1n << 64n) - 1n;
