@@ -25,19 +25,26 @@ void ElementTree<S>::start(const Primitives& elements, std::uint32_t leaf_size, 
 }
 
 template <class S>
-ElementBoxesJob<S> ElementTree<S>::job(const S* vertex_boxes) {
-  return {vertex_boxes,  elements_->vertices.data(),
-          corners_each_, elements_->count(),
-          room_.boxes,   nullptr,
-          room_.stride,  room_.extent};
+ElementLeafBoxesJob<S> ElementTree<S>::leaf_job(const S* vertex_boxes) {
+  const WideLeafLists lists = tree_.leaf_lists();
+  return {vertex_boxes,
+          leaf_corners_.data(),
+          corners_each_,
+          tree_.padded_leaf_size(),
+          lists.first_entry,
+          lists.end_entry,
+          0,
+          tree_.leaf_count(),
+          tree_.leaves(nullptr).rows,
+          tree_.leaf_boxes()};
 }
 
 template <class S>
 void ElementTree<S>::refresh(const S* vertex_boxes, double most_growth) {
   if (state_ == State::current) return;
   if (state_ == State::outdated && !tree_.empty()) {
-    element_box_kernels<S>(kernels_).elements(job(vertex_boxes));
-    tree_.fit(room_.boxes);
+    element_box_kernels<S>(kernels_).leaves(leaf_job(vertex_boxes));
+    build_kernels<S>(kernels_).nodes(tree_.arrays(), tree_.leaf_boxes(), tree_.node_count());
     ++work_.refits;
     if (!(surface() > most_growth * surface_when_built_)) {
       state_ = State::current;
@@ -50,10 +57,10 @@ void ElementTree<S>::refresh(const S* vertex_boxes, double most_growth) {
 template <class S>
 void ElementTree<S>::build(const S* vertex_boxes) {
   const std::uint32_t count = elements_->count();
-  room_ = order_.room(count, count, kernels_);
-  ElementBoxesJob<S> boxes = job(vertex_boxes);
-  boxes.centres = room_.centres;
-  if (count != 0) element_box_kernels<S>(kernels_).elements(boxes);
+  const typename CurveOrder<S>::Room room = order_.room(count, count, kernels_);
+  if (count != 0)
+    element_box_kernels<S>(kernels_).elements({vertex_boxes, elements_->vertices.data(), corners_each_, count,
+                                               room.boxes, room.centres, room.stride, room.extent});
   builder_.build(tree_, order_, *list_);
   list_corners();
   surface_when_built_ = surface();
@@ -124,17 +131,13 @@ void ElementTree<S>::list_places() {
 }
 
 template <class S>
-bool ElementTree<S>::remake_leaf(const ElementBoxesJob<S>& boxes, std::uint32_t leaf) {
-  const std::uint32_t padded = tree_.padded_leaf_size();
-  const std::span<const std::uint32_t> ids = tree_.leaf_primitives(leaf);
-  element_box_kernels<S>(kernels_).listed(boxes, ids.data(), std::uint32_t(ids.size()));
-  const WideLeafLists lists = tree_.leaf_lists();
-  S* const own = tree_.leaf_boxes() + std::size_t(8) * leaf;
+bool ElementTree<S>::remake_leaf(ElementLeafBoxesJob<S>& job, std::uint32_t leaf) {
+  const S* const own = job.leaf_boxes + std::size_t(8) * leaf;
   S before[8];
   std::copy_n(own, 8, before);
-  build_kernels<S>(kernels_).leaf_rows[padded == 8 ? 2 : 3](
-      {room_.boxes, lists.primitives, lists.first_entry + leaf, lists.end_entry + leaf, 1,
-       tree_.leaves(nullptr).rows + leaf * lane_scalars(padded), own});
+  job.begin = leaf;
+  job.end = leaf + 1;
+  element_box_kernels<S>(kernels_).leaves(job);
   return !std::equal(before, before + 3, own) || !std::equal(before + 4, before + 7, own + 4);
 }
 
@@ -150,12 +153,12 @@ void ElementTree<S>::refit_moved(const S* vertex_boxes, std::uint32_t vertices,
       const std::uint32_t leaf = leaf_of_element_[elements_of_vertex_[i]];
       dirty_leaves_[leaf / 64] |= std::uint64_t(1) << leaf % 64;
     }
-  const ElementBoxesJob<S> boxes = job(vertex_boxes);
+  ElementLeafBoxesJob<S> job = leaf_job(vertex_boxes);
   for (std::size_t word = 0; word < dirty_leaves_.size(); ++word)
     for (; dirty_leaves_[word] != 0; dirty_leaves_[word] &= dirty_leaves_[word] - 1) {
       const auto leaf = std::uint32_t(64 * word) + std::uint32_t(std::countr_zero(dirty_leaves_[word]));
       ++work_.leaves_remade;
-      if (!remake_leaf(boxes, leaf)) continue;
+      if (!remake_leaf(job, leaf)) continue;
       const std::uint32_t node = node_of_leaf_[leaf];
       dirty_nodes_[node / 64] |= std::uint64_t(1) << node % 64;
     }

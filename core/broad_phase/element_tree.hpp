@@ -50,13 +50,14 @@ class ElementTree {
   std::size_t bytes() const;
 
  private:
-  ElementBoxesJob<S> job(const S* vertex_boxes);
+  /// Returns the job that makes all leaves' boxes.
+  ElementLeafBoxesJob<S> leaf_job(const S* vertex_boxes);
   void build(const S* vertex_boxes);
   void list_corners();
   void list_incidence(std::uint32_t vertices);
   void list_places();
   /// Computes the boxes of one leaf and its elements; returns whether the leaf's box changed.
-  bool remake_leaf(const ElementBoxesJob<S>& boxes, std::uint32_t leaf);
+  bool remake_leaf(ElementLeafBoxesJob<S>& job, std::uint32_t leaf);
   double surface();
 
   const Primitives* elements_ = nullptr;
@@ -67,7 +68,6 @@ class ElementTree {
   CurveOrder<S> order_;
   LinearBuilder<S> builder_;
   BuiltTree<S> tree_;
-  typename CurveOrder<S>::Room room_{};
   UnfilledArray<std::uint32_t> leaf_corners_;  // [leaf][corner][padded]
   double surface_when_built_ = 0;
   // For partial refits. Incidence is listed at the first one, places in the tree at the first one after a
