@@ -164,19 +164,20 @@ template <class S>
 template <class S, std::uint32_t each>
 [[gnu::always_inline]] inline void boxes_of(const ElementBoxesJob<S>& job) {
   Corner<S> smallest, largest;
-  for (std::uint32_t e = 0; e < job.count; ++e) {
+  for (std::uint32_t k = 0; k < job.count; ++k) {
+    const std::uint32_t e = job.living == nullptr ? k : job.living[k];
     const Box8<S> box = box_of<S, each>(job, e);
     store(box, job.boxes + std::size_t(8) * e);
     const Corner<S> centre = sum(box.lower, box.upper);
-    smallest = e == 0 ? centre : smaller(smallest, centre);
-    largest = e == 0 ? centre : larger(largest, centre);
+    smallest = k == 0 ? centre : smaller(smallest, centre);
+    largest = k == 0 ? centre : larger(largest, centre);
     S at[4];
     centre.store(at);
-    for (std::size_t axis = 0; axis < 3; ++axis) job.centres[axis * job.stride + e] = at[axis];
+    for (std::size_t axis = 0; axis < 3; ++axis) job.centres[axis * job.stride + k] = at[axis];
   }
   for (std::size_t axis = 0; axis < 3; ++axis)  // readers take whole registers
-    for (std::size_t e = job.count; e < job.stride; ++e)
-      job.centres[axis * job.stride + e] = job.centres[axis * job.stride + job.count - 1];
+    for (std::size_t k = job.count; k < job.stride; ++k)
+      job.centres[axis * job.stride + k] = job.centres[axis * job.stride + job.count - 1];
   smallest.store(job.extent);
   largest.store(job.extent + 4);
 }

@@ -38,9 +38,10 @@ struct ElementBoxesJob {
   const S* vertex_boxes;         ///< [vertex][8]
   const std::uint32_t* corners;  ///< [element][corners_each]
   std::uint32_t corners_each;    ///< 1, 2 or 3
+  const std::uint32_t* living;   ///< [k]: the k-th element of the job; null: k
   std::uint32_t count;           ///< not 0
   S* boxes;                      ///< [element][8]
-  S* centres;                    ///< [axis][stride]: lower + upper of each element
+  S* centres;                    ///< [axis][stride]: lower + upper of the k-th element
   std::size_t stride;            ///< a multiple of 4, at least `count`
   S* extent;                     ///< [8]: the smallest centre x, y, z, unused, and the largest
 };
