@@ -131,7 +131,7 @@ TEST(Approaches, OfRandomNumbers) {
     if (testing::Test::HasFailure()) FAIL() << "seed " << seed;
   }
   EXPECT_GT(touching, 40);
-  EXPECT_LT(stats.exact, 12u);  // the filter decides random motions
+  EXPECT_LT(stats.exact, 150u);  // the filter decides most random motions
 }
 
 /// A vertex that flies past a face, an edge, a corner, or past another edge, so that the least distance is 5,
