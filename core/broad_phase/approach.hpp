@@ -18,7 +18,7 @@ namespace kbvh {
 /// the first t is its begin or a root of one of the polynomials, roots are isolated by Sturm sequences, and
 /// signs at a root are Tarski queries (as in find_impact).
 ///
-/// The filter compares at most about a hundred distances; integers isolate the roots of up to 25 polynomials,
+/// The filter compares at most about a hundred distances; integers isolate the roots of up to 21 polynomials,
 /// which is far slower and allocates. Thread-safe; `stats`, if given, must not be shared between threads.
 Impact find_approach(Contact::Kind kind, const MovingPoints& points, double distance,
                      ImpactStats* stats = nullptr);
