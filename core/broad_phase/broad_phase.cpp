@@ -1,92 +1,21 @@
 #include "core/broad_phase/broad_phase.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 
+#include "core/broad_phase/checked_input.hpp"
 #include "core/broad_phase/element_distance.hpp"
 #include "core/families/wide/leaf_slots.hpp"
 #include "core/geometry/box.hpp"
-#include "core/motion/admissible.hpp"
 
 namespace kbvh {
 namespace {
 
 template <class S>
-bool admissible(S x) {
-  return std::fabs(x) <= admissible_magnitude<S>;
-}
-
-template <class S>
-[[noreturn]] void refuse_coordinate(const MatrixView<S>& v, std::size_t row, const char* what) {
-  for (std::size_t axis = 0; axis < 3; ++axis)
-    if (!admissible(v(row, axis)))
-      throw std::invalid_argument(std::string(what) + ": coordinate " + "xyz"[axis] + " of vertex " +
-                                  std::to_string(row) + " is " + number_text(double(v(row, axis))) +
-                                  ", beyond the limit of " + admissible_text<S>());
-  throw std::logic_error("no coordinate is inadmissible");
-}
-
-template <class S>
-void check_shape(const MatrixView<S>& v, std::size_t vertices, const char* what) {
-  if (v.rows != vertices)
-    throw std::invalid_argument(std::string(what) + " has " + std::to_string(v.rows) + " rows for " +
-                                std::to_string(vertices) + " vertices");
-  if (v.rows != 0 && v.columns != 3)
-    throw std::invalid_argument(std::string(what) + " has " + std::to_string(v.columns) +
-                                " columns instead of 3");
-}
-
-/// Checks all coordinates; where they lie without gaps, in one loop over the memory.
-template <class S>
-void check_positions(const MatrixView<S>& v, std::size_t vertices, const char* what) {
-  check_shape(v, vertices, what);
-  const auto rows = std::ptrdiff_t(v.rows);
-  unsigned wrong = 0;
-  if ((v.row_step == 3 && v.column_step == 1) || (v.row_step == 1 && v.column_step == rows)) {
-    for (std::size_t i = 0; i < 3 * v.rows; ++i) wrong |= admissible(v.data[i]) ? 0U : 1U;
-  } else {
-    for (std::size_t row = 0; row < v.rows; ++row)
-      for (std::size_t axis = 0; axis < 3; ++axis) wrong |= admissible(v(row, axis)) ? 0U : 1U;
-  }
-  if (wrong == 0) return;
-  for (std::size_t row = 0; row < v.rows; ++row)
-    if (!admissible(v(row, 0)) || !admissible(v(row, 1)) || !admissible(v(row, 2)))
-      refuse_coordinate(v, row, what);
-}
-
-template <class S>
 StridedPoints<S> strided(const MatrixView<S>& v) {
   return {v.data, v.row_step, v.column_step};
-}
-
-/// Returns a + b of two numbers that are not negative, rounded up.
-template <class S>
-S sum_up(S a, S b) {
-  const S sum = a + b;
-  // A sum that was rounded down is smaller than one of its parts says.
-  const S rest = sum - a;
-  const S error = (a - (sum - rest)) + (b - rest);
-  return error > 0 ? std::nextafter(sum, std::numeric_limits<S>::infinity()) : sum;
-}
-
-/// Returns a / 2, rounded up: exact but for the smallest numbers.
-template <class S>
-S half_up(S a) {
-  const S half = a / 2;
-  return half + half < a ? std::nextafter(half, std::numeric_limits<S>::infinity()) : half;
-}
-
-/// Returns the smallest S that is not less than a length. Throws std::invalid_argument unless it is one.
-template <class S>
-S length_up(double length, const char* what) {
-  if (!(length >= 0 && length <= double(admissible_magnitude<S>)))
-    throw std::invalid_argument(std::string(what) + " is " + number_text(length) +
-                                ", not a number from 0 to " + admissible_text<S>());
-  const S rounded = S(length);
-  return double(rounded) < length ? std::nextafter(rounded, std::numeric_limits<S>::infinity()) : rounded;
 }
 
 }  // namespace
@@ -128,6 +57,11 @@ void BroadPhase<S>::start(const MatrixView<S>& v0, const MatrixView<S>& v1, Elem
   for (std::size_t kind = 0; kind < element_kinds; ++kind)
     trees_[kind].start(elements_->lists[kind], settings_.leaf_size, kernels_);
   detections_ = references_ = 0;
+  filter_.clear();
+  for (std::size_t kind = 0; kind < candidate_kinds.size(); ++kind) {
+    candidate_changes_[kind].clear();
+    near_changes_[kind].clear();
+  }
   motion_ = motion;
   if (motion == Motion::straight) end_points_.resize(4 * vertices);
   VertexBoxesJob<S> job = vertex_job(v0, v1);
@@ -209,7 +143,7 @@ void BroadPhase<S>::update(const MatrixView<S>& v, std::span<const std::uint32_t
     if (vertex >= v.rows)
       throw std::invalid_argument("vertex " + std::to_string(vertex) + " moved, but there are " +
                                   std::to_string(v.rows));
-    if (!admissible(v(vertex, 0)) || !admissible(v(vertex, 1)) || !admissible(v(vertex, 2)))
+    if (!is_admissible(v(vertex, 0)) || !is_admissible(v(vertex, 1)) || !is_admissible(v(vertex, 2)))
       refuse_coordinate(v, vertex, "V");
   }
   if (moved.empty()) return;
@@ -265,6 +199,140 @@ void BroadPhase<S>::forget_trees() {
 }
 
 template <class S>
+void BroadPhase<S>::forget_found(Element element) {
+  for (const CandidateKind kind : candidate_kinds)
+    if (first_element(kind) == element || second_element(kind) == element)
+      found_valid_[std::size_t(kind)] = false;
+}
+
+template <class S>
+InsertedElements BroadPhase<S>::add(const MatrixView<S>& v, const Primitives& edges,
+                                    const Primitives& faces) {
+  constexpr std::size_t limit = std::size_t(1) << 30;
+  const Primitives* const added[] = {&edges, &faces};
+  if (v.rows != 0) check_positions(v, v.rows, "V");
+  if (elements_->vertex_count() + v.rows >= limit)
+    throw std::length_error("2^30 vertices or more; fewer are possible");
+  for (const std::size_t kind : {std::size_t(1), std::size_t(2)})
+    if (std::size_t(elements_->lists[kind].count()) + added[kind - 1]->count() >= limit)
+      throw std::length_error("2^30 elements of one kind or more; fewer are possible");
+  const InsertedElements first{elements_->vertex_count(), elements_->count(Element::edge),
+                               elements_->count(Element::face)};
+  for (const std::size_t kind : {std::size_t(1), std::size_t(2)}) {
+    if (added[kind - 1]->count() == 0) continue;
+    for (std::uint32_t i = 0; i < added[kind - 1]->count(); ++i)
+      elements_->lists[kind].add((*added[kind - 1])[i]);
+    trees_[kind].elements_inserted();
+    forget_found(Element(kind));
+  }
+  if (v.rows != 0) add_vertices(v);
+  filter_.elements_inserted(*elements_);
+  groups_changed();
+  return first;
+}
+
+template <class S>
+void BroadPhase<S>::add_vertices(const MatrixView<S>& v) {
+  const std::size_t first = elements_->vertex_count(), count = first + v.rows;
+  for (std::uint32_t id = std::uint32_t(first); id < count; ++id)
+    elements_->lists[0].add(std::span<const std::uint32_t>(&id, 1));
+  points_.resize(4 * count);
+  if (motion_ == Motion::straight) end_points_.resize(4 * count);
+  boxes_.resize(8 * count);
+  for (std::size_t row = 0; row < v.rows; ++row)
+    for (std::size_t axis = 0; axis < 4; ++axis) {
+      const std::size_t at = 4 * (first + row) + axis;
+      points_[at] = axis < 3 ? v(row, axis) : S(0);
+      if (motion_ == Motion::straight) end_points_[at] = points_[at];
+    }
+  if (!displacements_.empty()) {
+    displacements_.resize(count, *std::min_element(displacements_.begin(), displacements_.end()));
+    grown_each_.resize(count, sum_up(half_radius_, displacements_.back()));
+  }
+  trees_[0].elements_inserted();
+  for (ElementTree<S>& tree : trees_) tree.vertices_inserted();
+  forget_found(Element::vertex);
+  VertexBoxesJob<S> job = packed_job();
+  std::vector<std::uint32_t> added(v.rows);
+  std::iota(added.begin(), added.end(), std::uint32_t(first));
+  job.vertices = added.data();
+  job.count = std::uint32_t(added.size());
+  job.grown = sum_up(half_radius_, displacement_);
+  job.grown_each = grown_each_.empty() ? nullptr : grown_each_.data();
+  element_box_kernels<S>(kernels_).vertices(job);
+}
+
+template <class S>
+void BroadPhase<S>::remove(Element element, std::span<const std::uint32_t> ids) {
+  elements();
+  Primitives& list = elements_->lists[std::size_t(element)];
+  const char* const word = element == Element::vertex ? "vertex "
+                           : element == Element::edge ? "edge "
+                                                      : "face ";
+  std::vector<std::uint32_t> sorted(ids.begin(), ids.end());
+  std::sort(sorted.begin(), sorted.end());
+  for (std::size_t i = 0; i < sorted.size(); ++i) {
+    const std::uint32_t id = sorted[i];
+    const char* const wrong = id >= list.count()             ? " does not exist"
+                              : !list.alive(id)              ? " has been removed before"
+                              : i > 0 && sorted[i - 1] == id ? " is to be removed twice"
+                                                             : nullptr;
+    if (wrong != nullptr) throw std::invalid_argument(word + std::to_string(id) + wrong);
+  }
+  if (sorted.empty()) return;
+  for (const std::uint32_t id : sorted) list.remove(id);
+  trees_[std::size_t(element)].elements_removed(boxes_.data(), sorted);
+  for (const CandidateKind kind : candidate_kinds) {
+    CandidateBuffer& found = found_[std::size_t(kind)];
+    if (!found_valid_[std::size_t(kind)]) continue;
+    const bool first = first_element(kind) == element, second = second_element(kind) == element;
+    if (first || second)
+      std::erase_if(found, [&](const Candidate& pair) {
+        return (first && !list.alive(pair.first)) || (second && !list.alive(pair.second));
+      });
+  }
+}
+
+template <class S>
+void BroadPhase<S>::groups_changed() {
+  for (ElementTree<S>& tree : trees_) tree.forget_groups();
+}
+
+template <class S>
+void BroadPhase<S>::set_groups(Element element, std::span<const GroupMask> groups) {
+  filter_.set_groups(elements(), element, groups);
+  groups_changed();
+  forget_found();
+}
+
+template <class S>
+void BroadPhase<S>::set_vertex_groups(std::span<const GroupMask> groups) {
+  filter_.set_vertex_groups(elements(), groups);
+  groups_changed();
+  forget_found();
+}
+
+template <class S>
+void BroadPhase<S>::exclude(CandidateKind kind, std::span<const Candidate> pairs) {
+  filter_.exclude(elements(), kind, pairs);
+  found_valid_[std::size_t(kind)] = false;
+}
+
+template <class S>
+void BroadPhase<S>::keep_only(PairFunction function) {
+  elements();
+  filter_.set_function(std::move(function));
+  forget_found();
+}
+
+template <class S>
+void BroadPhase<S>::clear_filters() {
+  filter_.clear();
+  groups_changed();
+  forget_found();
+}
+
+template <class S>
 void BroadPhase<S>::refresh() {
   elements();
   for (ElementTree<S>& tree : trees_)
@@ -288,15 +356,23 @@ void BroadPhase<S>::search(CandidateKind kind, CandidateBuffer& out) {
   ElementTree<S>& b = current_tree(second);
   if (a.empty() || b.empty() || !overlap(a.root_box(), b.root_box())) return;
   const ElementLeaves<S> leaves_a = a.leaves(), leaves_b = b.leaves();
+  const bool one = first == second, grouped = filter_.has_groups(kind);
   const auto& kernels = wide_overlap_kernels<S>(kernels_);
-  const auto traverse = first == second ? kernels.self(8) : kernels.traverse(8);
+  const auto traverse = one ? kernels.self(8) : kernels.traverse(8);
+  const auto& by_groups = group_traversal_kernels<S>(kernels_);
+  const auto traverse_groups = one ? by_groups.self : by_groups.two;
+  const GroupArrays groups_a = grouped ? a.groups(filter_.groups(first)) : GroupArrays{};
+  const GroupArrays groups_b = grouped ? b.groups(filter_.groups(second)) : GroupArrays{};
   stack_.resize(std::max<std::size_t>(stack_.size(), 1024));
   leaf_pairs_.resize(2 * leaf_pair_room);
   WideTraversal state{stack_.data(),  0, stack_.size(),    leaf_pairs_.data(), 0,
                       leaf_pair_room, 1, ~std::uint64_t(0)};
   state.stack[state.depth++] = {0, 0};
   while (state.depth > 0) {
-    traverse(leaves_a.tree, leaves_b.tree, state);
+    if (grouped)
+      traverse_groups(leaves_a.tree, leaves_b.tree, groups_a, groups_b, state);
+    else
+      traverse(leaves_a.tree, leaves_b.tree, state);
     take_leaf_pairs(kind, leaves_a, leaves_b, state.found, out);
     state.found = 0;
     if (state.depth + max_pairs_per_step < state.stack_room) continue;
@@ -317,6 +393,7 @@ void BroadPhase<S>::take_leaf_pairs(CandidateKind kind, const ElementLeaves<S>& 
       element_pairs_step +
       std::size_t(4) * (elements_->count(first_element(kind)) + elements_->count(second_element(kind)));
   ElementPairsJob<S> job{a, b, leaf_pairs_.data(), 0, count, nullptr, 0, 0, 0};
+  const bool filtered = filter_.looks_at(kind);
   while (job.next < job.count) {
     // The kernel writes into the list itself, as far as its memory reaches.
     const std::size_t before = out.size();
@@ -328,6 +405,7 @@ void BroadPhase<S>::take_leaf_pairs(CandidateKind kind, const ElementLeaves<S>& 
     job.out_room = out.size() - before;
     pairs(job);
     out.resize(before + job.found);
+    if (filtered) out.resize(before + filter_.keep(kind, {out.data() + before, job.found}));
   }
   last_box_tests_ += job.tests;
 }
@@ -371,14 +449,28 @@ void BroadPhase<S>::within(CandidateKind kind, double distance, CandidateBuffer&
 }
 
 template <class S>
-EarliestImpact BroadPhase<S>::earliest_impact(EarliestImpactStats* stats) {
+CandidateChanges BroadPhase<S>::changes(CandidateKind kind) {
+  return candidate_changes_[std::size_t(kind)].take(candidates(kind), elements_->count(first_element(kind)));
+}
+
+template <class S>
+CandidateChanges BroadPhase<S>::changes_within(CandidateKind kind, double distance) {
+  within(kind, distance, near_);
+  return near_changes_[std::size_t(kind)].take(near_, elements_->count(first_element(kind)));
+}
+
+template <class S>
+EarliestImpact BroadPhase<S>::earliest_impact(double separation, EarliestImpactStats* stats) {
   elements();
   if (motion_ != Motion::straight)
     throw std::logic_error("an impact is asked for without a motion from V0 to V1");
+  if (!(separation >= 0 && separation <= double(radius_)))
+    throw std::invalid_argument("earliest_impact() takes a separation from 0 to the radius " +
+                                number_text(double(radius_)) + ", not " + number_text(separation));
   EarliestImpact earliest;
   for (const CandidateKind kind : {CandidateKind::face_vertex, CandidateKind::edge_edge})
-    take_earlier_impacts<S>(kind, *elements_, points_.data(), end_points_.data(), kept(kind), earliest,
-                            stats);
+    take_earlier_impacts<S>(kind, *elements_, points_.data(), end_points_.data(), kept(kind), separation,
+                            earliest, stats);
   return earliest;
 }
 
@@ -390,9 +482,13 @@ std::size_t BroadPhase<S>::bytes() const {
                       stack_.capacity() * sizeof(WidePair) + leaf_pairs_.capacity() * sizeof(LeafSlot);
   for (const ElementTree<S>& tree : trees_) total += tree.bytes();
   for (const CandidateBuffer& found : found_) total += found.capacity() * sizeof(Candidate);
+  for (const auto* const trackers : {&candidate_changes_, &near_changes_})
+    for (const ChangeTracker& tracker : *trackers) total += tracker.bytes();
+  total += near_.capacity() * sizeof(Candidate) + filter_.bytes();
   if (elements_)
     for (const Primitives& list : elements_->lists)
-      total += (list.offsets.capacity() + list.vertices.capacity()) * sizeof(std::uint32_t);
+      total += (list.offsets.capacity() + list.vertices.capacity()) * sizeof(std::uint32_t) +
+               list.removed.capacity();
   return total;
 }
 

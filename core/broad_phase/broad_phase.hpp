@@ -1,13 +1,17 @@
 #pragma once
 #include <array>
+#include <concepts>
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
+#include "core/broad_phase/changes.hpp"
 #include "core/broad_phase/earliest_impact.hpp"
 #include "core/broad_phase/element_tree.hpp"
 #include "core/broad_phase/elements.hpp"
+#include "core/broad_phase/pair_filter.hpp"
 #include "core/families/wide/kernels/wide_overlap.hpp"
 #include "core/kernels/kernel_set.hpp"
 
@@ -22,13 +26,19 @@ struct BroadPhaseSettings {
   std::optional<KernelSet> kernels{};
 };
 
+/// The ids of the first vertex, edge and face of those that were inserted; the others follow.
+struct InsertedElements {
+  std::uint32_t vertex, edge, face;
+};
+
 /// The broad phase of a simulation: pairs of vertices, edges and faces of a mesh whose boxes overlap. One
 /// object holds one mesh; several bodies are one mesh whose parts have no common vertices.
 ///
 /// Boxes of elements grow by radius / 2 on each side, rounded outward, and are closed: two elements at a
 /// distance of at most `radius` are always a candidate. A swept box encloses the straight motions of its
-/// vertices between two times. Incident elements (with a common vertex) are no candidates. Answers are the
-/// same set on every machine and list each pair once, in an order that depends on the tree.
+/// vertices between two times. Incident elements (with a common vertex) are no candidates, nor are pairs that
+/// a filter excludes. Answers are the same set on every machine and list each pair once, in an order that
+/// depends on the tree.
 ///
 /// S is float or double. Coordinates are numbers of at most admissible_magnitude<S>; positions are n x 3 in
 /// the caller's memory, any strides (matrices and maps of Eigen convert), and are read during the call only.
@@ -45,9 +55,9 @@ class BroadPhase {
   BroadPhase& operator=(const BroadPhase&) = delete;
 
   /// Takes a mesh: positions V (n x 3), edges E (m x 2), faces F (k x 3), and the largest distance between
-  /// elements that `within` will be asked for, rounded up to S. Indices are checked and copied; a bound of
-  /// `valid_for` ends. Throws as `make_elements` does, and std::invalid_argument for a radius that is
-  /// negative or no number.
+  /// elements that `within` will be asked for, rounded up to S. Indices are checked and copied; filters and a
+  /// bound of `valid_for` end, and changes start over. Throws as `make_elements` does, and
+  /// std::invalid_argument for a radius that is negative or no number.
   template <IndexMatrix Edges, IndexMatrix Faces>
   void build(const MatrixView<S>& v, const Edges& e, const Faces& f, double radius = 0) {
     start(v, v, make_elements(v.rows, view_of(e), view_of(f)), radius, Motion::none);
@@ -67,6 +77,54 @@ class BroadPhase {
   /// the last update, and are not read. Costs in proportion to the elements that moved. Throws
   /// std::invalid_argument for a vertex out of range, and std::logic_error after a swept update.
   void update(const MatrixView<S>& v, std::span<const std::uint32_t> moved);
+
+  /// Adds vertices at the positions `v` (k x 3; they rest in a motion) and edges and faces between vertices,
+  /// the added ones included. From then on, positions have rows for the added vertices, too. Ids follow the
+  /// largest of their kind, that of a removed element included; all other ids are unchanged. A tree whose
+  /// elements become more is built again by the next search. Added elements have the default groups, or the
+  /// union of their vertices' where these were set; a bound for each vertex is the smallest one for added
+  /// vertices. Throws as `build` does.
+  template <IndexMatrix Edges, IndexMatrix Faces>
+  InsertedElements insert(const MatrixView<S>& v, const Edges& e, const Faces& f) {
+    const std::size_t vertices = elements().vertex_count() + v.rows;
+    return add(v, element_list(vertices, view_of(e), Element::edge),
+               element_list(vertices, view_of(f), Element::face));
+  }
+  /// Removes elements: they are no candidates any more, and their ids are never used again before the next
+  /// `build`. A removed vertex keeps its row in V, and edges and faces that name it stay. Costs in proportion
+  /// to the removed elements and the candidates that are kept; trees shrink, and one that has lost half of
+  /// its elements is built again. Throws std::invalid_argument for an id that does not exist, was removed, or
+  /// is named twice.
+  void remove(Element element, std::span<const std::uint32_t> ids);
+
+  /// Set groups and masks of all elements of one kind, in place of those set before; none: the default, which
+  /// admits every pair. Two elements are a candidate only if each has a group in the mask of the other;
+  /// searches skip subtrees without such elements. Throw std::invalid_argument for another number of elements
+  /// than there are ids.
+  void set_groups(Element element, std::span<const GroupMask> groups);
+  /// Sets them for vertices. Edges and faces get the union of their vertices' groups, and of their masks:
+  /// they pair where a vertex of one may pair with a vertex of the other.
+  void set_vertex_groups(std::span<const GroupMask> groups);
+  /// Excludes pairs of one kind, in place of those excluded before. Throws std::invalid_argument for an id
+  /// that does not exist.
+  void exclude(CandidateKind kind, std::span<const Candidate> pairs);
+  /// Lets a function choose among the pairs that no other filter excludes, many at a time: see PairFunction.
+  /// It has to give the same answer whenever it is asked about a pair. Exceptions that it throws end the
+  /// search and pass to the caller. An empty function ends this.
+  void keep_only(PairFunction function);
+  /// The same with keep(kind, pair), which says whether a pair stays.
+  template <class Keep>
+  requires std::predicate<Keep, CandidateKind, const Candidate&>
+  void keep_if(Keep keep) {
+    keep_only([keep = std::move(keep)](CandidateKind kind, std::span<Candidate> pairs) mutable {
+      std::size_t kept = 0;
+      for (const Candidate& pair : pairs)
+        if (keep(kind, pair)) pairs[kept++] = pair;
+      return kept;
+    });
+  }
+  /// Ends all filters.
+  void clear_filters();
 
   /// Makes the trees of earlier searches current now; otherwise the next search does this.
   void refresh();
@@ -88,10 +146,21 @@ class BroadPhase {
   /// are what their corners span. Throws std::invalid_argument unless 0 <= distance <= radius.
   void within(CandidateKind kind, double distance, CandidateBuffer& out);
 
-  /// Finds the first contact of a vertex and a face, or of two edges, during the motion from V0 to V1: exact
-  /// verdicts in real arithmetic on the given numbers, no epsilon (core/continuous/impact.hpp). Contact at
-  /// t = 0 counts. Throws std::logic_error unless the last positions were a motion.
-  EarliestImpact earliest_impact(EarliestImpactStats* stats = nullptr);
+  /// Returns which candidates of a kind began and which ended since the last call for this kind; at the first
+  /// one since `build`, all begin. Both lists are ascending and valid until the next call for this kind.
+  /// O(elements + candidates log(candidates of one element)).
+  CandidateChanges changes(CandidateKind kind);
+  /// Returns the same of the pairs within a distance, which may be another one at each call. These changes
+  /// and those of candidates do not affect each other. Throws as `within` does.
+  CandidateChanges changes_within(CandidateKind kind, double distance);
+
+  /// Finds the first time during the motion from V0 to V1 at which the distance of a vertex and a face, or of
+  /// two edges, is at most the separation; 0: the first contact. Verdicts are exact, in real arithmetic on
+  /// the given numbers, no epsilon (core/continuous/impact.hpp; core/broad_phase/approach.hpp), and the time
+  /// is enclosed. A distance that is reached at a single instant counts, and so does t = 0. Incident elements
+  /// do not count, nor do pairs that a filter excludes. Throws std::logic_error unless the last positions
+  /// were a motion, and std::invalid_argument unless 0 <= separation <= radius.
+  EarliestImpact earliest_impact(double separation = 0, EarliestImpactStats* stats = nullptr);
 
   /// From now on candidates hold for all positions in which no coordinate of a vertex differs by more than
   /// `displacement` from its value at the last detection: updates within that bound cost a comparison and
@@ -136,6 +205,10 @@ class BroadPhase {
   /// Makes boxes, grown by the displacement too, from the packed positions.
   void refer_to_present();
   void forget_found() { found_valid_.fill(false); }
+  void forget_found(Element element);
+  InsertedElements add(const MatrixView<S>& v, const Primitives& edges, const Primitives& faces);
+  void add_vertices(const MatrixView<S>& v);
+  void groups_changed();
   ElementTree<S>& current_tree(Element element);
   void search(CandidateKind kind, CandidateBuffer& out);
   void take_leaf_pairs(CandidateKind kind, const ElementLeaves<S>& a, const ElementLeaves<S>& b,
@@ -156,6 +229,9 @@ class BroadPhase {
   // Answers that are kept, by kind.
   std::array<CandidateBuffer, 6> found_;
   std::array<bool, 6> found_valid_{};
+  PairFilter filter_;
+  std::array<ChangeTracker, 6> candidate_changes_, near_changes_;
+  CandidateBuffer near_;
   // For temporary use by searches.
   std::vector<WidePair> stack_;
   std::vector<LeafSlot> leaf_pairs_;

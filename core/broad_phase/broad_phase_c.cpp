@@ -6,13 +6,19 @@
 #include <stdexcept>
 #include <string>
 #include <variant>
+#include <vector>
 
 #include "core/broad_phase/broad_phase.hpp"
 
 using kbvh::BroadPhase;
 using kbvh::Candidate;
 using kbvh::CandidateBuffer;
+using kbvh::CandidateChanges;
 using kbvh::CandidateKind;
+using kbvh::EarliestImpact;
+using kbvh::Element;
+using kbvh::GroupMask;
+using kbvh::InsertedElements;
 using kbvh::MatrixView;
 
 struct kbvh_broad_phase {
@@ -55,8 +61,22 @@ CandidateKind checked(kbvh_candidate_kind kind) {
   return CandidateKind(kind);
 }
 
+Element checked(kbvh_element element) {
+  if (int(element) < 0 || int(element) > 2)
+    throw std::invalid_argument("an element is 0 to 2, not " + std::to_string(int(element)));
+  return Element(element);
+}
+
 void check_pointer(const void* pointer, const char* what) {
   if (pointer == nullptr) throw std::invalid_argument(std::string(what) + " is a null pointer");
+}
+
+/// Groups of a caller, in the layout of this library.
+std::vector<GroupMask> groups_of(const kbvh_group_mask* groups, std::size_t count) {
+  if (count != 0) check_pointer(groups, "groups");
+  std::vector<GroupMask> list;
+  for (std::size_t i = 0; i < count; ++i) list.push_back({groups[i].groups, groups[i].mask});
+  return list;
 }
 
 void hand_over(std::span<const Candidate> found, const std::uint32_t** pairs, std::size_t* count) {
@@ -135,6 +155,99 @@ int kbvh_broad_phase_within(kbvh_broad_phase* handle, kbvh_candidate_kind kind, 
     check_pointer(count, "count");
     broad.within(checked(kind), distance, handle->within);
     hand_over(handle->within, pairs, count);
+  });
+}
+
+int kbvh_broad_phase_insert(kbvh_broad_phase* handle, const kbvh_positions* v, const int32_t* edges,
+                            size_t edge_count, const int32_t* faces, size_t face_count, uint32_t first[3]) {
+  return guarded(handle, [&]<class S>(BroadPhase<S>& broad, S) {
+    check_pointer(first, "first");
+    const InsertedElements inserted = broad.insert(v == nullptr ? MatrixView<S>() : view<S>(*v),
+                                                   MatrixView<std::int32_t>::by_rows(edges, edge_count, 2),
+                                                   MatrixView<std::int32_t>::by_rows(faces, face_count, 3));
+    first[0] = inserted.vertex;
+    first[1] = inserted.edge;
+    first[2] = inserted.face;
+  });
+}
+
+int kbvh_broad_phase_remove(kbvh_broad_phase* handle, kbvh_element element, const uint32_t* ids,
+                            size_t count) {
+  return guarded(handle, [&](auto& broad, auto) {
+    broad.remove(checked(element), std::span<const std::uint32_t>(ids, count));
+  });
+}
+
+int kbvh_broad_phase_set_groups(kbvh_broad_phase* handle, kbvh_element element, const kbvh_group_mask* groups,
+                                size_t count) {
+  return guarded(handle,
+                 [&](auto& broad, auto) { broad.set_groups(checked(element), groups_of(groups, count)); });
+}
+
+int kbvh_broad_phase_set_vertex_groups(kbvh_broad_phase* handle, const kbvh_group_mask* groups,
+                                       size_t count) {
+  return guarded(handle, [&](auto& broad, auto) { broad.set_vertex_groups(groups_of(groups, count)); });
+}
+
+int kbvh_broad_phase_exclude(kbvh_broad_phase* handle, kbvh_candidate_kind kind, const uint32_t* pairs,
+                             size_t count) {
+  return guarded(handle, [&](auto& broad, auto) {
+    if (count != 0) check_pointer(pairs, "pairs");
+    std::vector<Candidate> list;
+    for (std::size_t i = 0; i < count; ++i) list.push_back({pairs[2 * i], pairs[2 * i + 1]});
+    broad.exclude(checked(kind), list);
+  });
+}
+
+int kbvh_broad_phase_keep_only(kbvh_broad_phase* handle, kbvh_pair_filter filter, void* context) {
+  return guarded(handle, [&](auto& broad, auto) {
+    if (filter == nullptr) return broad.keep_only({});
+    broad.keep_only([filter, context](CandidateKind kind, std::span<Candidate> pairs) {
+      return filter(context, kbvh_candidate_kind(int(kind)), &pairs.data()->first, pairs.size());
+    });
+  });
+}
+
+int kbvh_broad_phase_clear_filters(kbvh_broad_phase* handle) {
+  return guarded(handle, [&](auto& broad, auto) { broad.clear_filters(); });
+}
+
+int kbvh_broad_phase_changes(kbvh_broad_phase* handle, kbvh_candidate_kind kind, const uint32_t** begun,
+                             size_t* begun_count, const uint32_t** ended, size_t* ended_count) {
+  return guarded(handle, [&](auto& broad, auto) {
+    check_pointer(begun, "begun");
+    check_pointer(begun_count, "begun_count");
+    check_pointer(ended, "ended");
+    check_pointer(ended_count, "ended_count");
+    const CandidateChanges changes = broad.changes(checked(kind));
+    hand_over(changes.begun, begun, begun_count);
+    hand_over(changes.ended, ended, ended_count);
+  });
+}
+
+int kbvh_broad_phase_changes_within(kbvh_broad_phase* handle, kbvh_candidate_kind kind, double distance,
+                                    const uint32_t** begun, size_t* begun_count, const uint32_t** ended,
+                                    size_t* ended_count) {
+  return guarded(handle, [&](auto& broad, auto) {
+    check_pointer(begun, "begun");
+    check_pointer(begun_count, "begun_count");
+    check_pointer(ended, "ended");
+    check_pointer(ended_count, "ended_count");
+    const CandidateChanges changes = broad.changes_within(checked(kind), distance);
+    hand_over(changes.begun, begun, begun_count);
+    hand_over(changes.ended, ended, ended_count);
+  });
+}
+
+int kbvh_broad_phase_earliest_impact(kbvh_broad_phase* handle, double separation, kbvh_impact* impact) {
+  return guarded(handle, [&](auto& broad, auto) {
+    check_pointer(impact, "impact");
+    const EarliestImpact found = broad.earliest_impact(separation);
+    *impact = {found.touches ? 1 : 0,
+               kbvh_candidate_kind(int(found.kind)),
+               {found.pair.first, found.pair.second},
+               found.begin,
+               found.end};
   });
 }
 

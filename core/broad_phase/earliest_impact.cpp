@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "core/base/assert.hpp"
+#include "core/broad_phase/approach.hpp"
 
 namespace kbvh {
 namespace {
@@ -17,8 +18,9 @@ struct Motion {
     return {{begin[0], begin[1], begin[2], begin[3]}, {end[0], end[1], end[2], end[3]}};
   }
 
-  /// Returns whether the points [0, split) and the others are certainly in two boxes apart from t = 0 to t.
-  bool apart_until(double t, int split) const {
+  /// Returns whether the points [0, split) and the others are certainly in two boxes that are farther apart
+  /// than the separation from t = 0 to t.
+  bool apart_until(double t, int split, double separation) const {
     constexpr double infinity = std::numeric_limits<double>::infinity();
     for (int axis = 0; axis < 3; ++axis) {
       double low[2] = {infinity, infinity}, high[2] = {-infinity, -infinity}, largest = 0;
@@ -30,7 +32,7 @@ struct Motion {
         largest = std::max({largest, std::fabs(from), std::fabs(to)});
       }
       // Each place at t is wrong by less than 4 half ulps of the largest number, and by underflow.
-      const double margin = largest * 0x1p-49 + 0x1p-1000;
+      const double margin = (separation + largest * 0x1p-49) * (1 + 0x1p-50) + 0x1p-1000;
       if (low[0] - high[1] > margin || low[1] - high[0] > margin) return true;
     }
     return false;
@@ -41,7 +43,7 @@ struct Motion {
 
 template <class S>
 void take_earlier_impacts(CandidateKind kind, const Elements& elements, const S* begin, const S* end,
-                          std::span<const Candidate> candidates, EarliestImpact& earliest,
+                          std::span<const Candidate> candidates, double separation, EarliestImpact& earliest,
                           EarliestImpactStats* stats) {
   KBVH_ASSERT(kind == CandidateKind::face_vertex || kind == CandidateKind::edge_edge);
   const bool edges = kind == CandidateKind::edge_edge;
@@ -61,11 +63,13 @@ void take_earlier_impacts(CandidateKind kind, const Elements& elements, const S*
         motion.end[i][axis] = double(end[std::size_t(4) * vertices[i] + std::size_t(axis)]);
       }
     ++counts.candidates;
-    if (motion.apart_until(earliest.end, edges ? 2 : 1)) {
+    if (motion.apart_until(earliest.end, edges ? 2 : 1, separation)) {
       ++counts.later;
       continue;
     }
-    const Impact impact = find_impact(contact, motion.points(), &counts.impacts);
+    const Impact impact = separation > 0
+                              ? find_approach(contact, motion.points(), separation, &counts.impacts)
+                              : find_impact(contact, motion.points(), &counts.impacts);
     if (!impact.touches) continue;
     const auto key = [](double time, CandidateKind of, const Candidate& pair) {
       return std::tuple(time, of, pair.first, pair.second);
@@ -85,8 +89,8 @@ void take_earlier_impacts(CandidateKind kind, const Elements& elements, const S*
 }
 
 template void take_earlier_impacts(CandidateKind, const Elements&, const float*, const float*,
-                                   std::span<const Candidate>, EarliestImpact&, EarliestImpactStats*);
+                                   std::span<const Candidate>, double, EarliestImpact&, EarliestImpactStats*);
 template void take_earlier_impacts(CandidateKind, const Elements&, const double*, const double*,
-                                   std::span<const Candidate>, EarliestImpact&, EarliestImpactStats*);
+                                   std::span<const Candidate>, double, EarliestImpact&, EarliestImpactStats*);
 
 }  // namespace kbvh

@@ -7,8 +7,9 @@
 
 namespace kbvh {
 
-/// The first contact during a motion from t = 0 to t = 1. If there is one, its time lies in [begin, end], and
-/// no two elements touch before `begin`.
+/// The first contact, or the first time within a separation, during a motion from t = 0 to t = 1. If there is
+/// one, its time lies in [begin, end], and no two elements touch, or are within the separation, before
+/// `begin`.
 struct EarliestImpact {
   bool touches = false;
   CandidateKind kind = CandidateKind::face_vertex;  ///< or edge_edge
@@ -25,17 +26,19 @@ struct EarliestImpactStats {
   ImpactStats impacts{};    ///< of all others
 };
 
-/// Takes the earlier of `earliest` and the first contacts of the candidates, face_vertex or edge_edge: exact
-/// verdicts by find_impact. Points are [vertex][4], at t = 0 and t = 1. The result does not depend on the
-/// order of candidates.
+/// Takes the earlier of `earliest` and the first times at which candidates, face_vertex or edge_edge, are
+/// within the separation: exact verdicts by find_impact for a separation of 0, else by find_approach. Points
+/// are [vertex][4], at t = 0 and t = 1. The result does not depend on the order of candidates.
 template <class S>
 void take_earlier_impacts(CandidateKind kind, const Elements& elements, const S* begin, const S* end,
-                          std::span<const Candidate> candidates, EarliestImpact& earliest,
+                          std::span<const Candidate> candidates, double separation, EarliestImpact& earliest,
                           EarliestImpactStats* stats = nullptr);
 
 extern template void take_earlier_impacts(CandidateKind, const Elements&, const float*, const float*,
-                                          std::span<const Candidate>, EarliestImpact&, EarliestImpactStats*);
+                                          std::span<const Candidate>, double, EarliestImpact&,
+                                          EarliestImpactStats*);
 extern template void take_earlier_impacts(CandidateKind, const Elements&, const double*, const double*,
-                                          std::span<const Candidate>, EarliestImpact&, EarliestImpactStats*);
+                                          std::span<const Candidate>, double, EarliestImpact&,
+                                          EarliestImpactStats*);
 
 }  // namespace kbvh

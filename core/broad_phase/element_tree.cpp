@@ -20,24 +20,39 @@ void ElementTree<S>::start(const Primitives& elements, std::uint32_t leaf_size, 
   state_ = State::unbuilt;
   first_of_vertex_.clear();
   elements_of_vertex_.clear();
-  places_listed_ = false;
+  places_listed_ = groups_listed_ = false;
   work_ = {};
 }
 
 template <class S>
-ElementBoxesJob<S> ElementTree<S>::job(const S* vertex_boxes) {
-  return {vertex_boxes,  elements_->vertices.data(),
-          corners_each_, elements_->count(),
-          room_.boxes,   nullptr,
-          room_.stride,  room_.extent};
+void ElementTree<S>::elements_inserted() {
+  list_.emplace(*elements_);
+  corners_each_ = elements_->count() == 0 ? 1 : list_->corners_each;
+  first_of_vertex_.clear();
+  state_ = State::unbuilt;
+}
+
+template <class S>
+ElementLeafBoxesJob<S> ElementTree<S>::leaf_job(const S* vertex_boxes) {
+  const WideLeafLists lists = tree_.leaf_lists();
+  return {vertex_boxes,
+          leaf_corners_.data(),
+          corners_each_,
+          tree_.padded_leaf_size(),
+          lists.first_entry,
+          leaf_ends_.data(),
+          0,
+          tree_.leaf_count(),
+          tree_.leaves(nullptr).rows,
+          tree_.leaf_boxes()};
 }
 
 template <class S>
 void ElementTree<S>::refresh(const S* vertex_boxes, double most_growth) {
   if (state_ == State::current) return;
   if (state_ == State::outdated && !tree_.empty()) {
-    element_box_kernels<S>(kernels_).elements(job(vertex_boxes));
-    tree_.fit(room_.boxes);
+    element_box_kernels<S>(kernels_).leaves(leaf_job(vertex_boxes));
+    build_kernels<S>(kernels_).nodes(tree_.arrays(), tree_.leaf_boxes(), tree_.node_count());
     ++work_.refits;
     if (!(surface() > most_growth * surface_when_built_)) {
       state_ = State::current;
@@ -49,15 +64,18 @@ void ElementTree<S>::refresh(const S* vertex_boxes, double most_growth) {
 
 template <class S>
 void ElementTree<S>::build(const S* vertex_boxes) {
-  const std::uint32_t count = elements_->count();
-  room_ = order_.room(count, count, kernels_);
-  ElementBoxesJob<S> boxes = job(vertex_boxes);
-  boxes.centres = room_.centres;
-  if (count != 0) element_box_kernels<S>(kernels_).elements(boxes);
+  if (list_->count != elements_->live_count()) list_.emplace(*elements_);
+  const std::uint32_t count = list_->count;
+  const typename CurveOrder<S>::Room room = order_.room(elements_->count(), count, kernels_);
+  if (count != 0)
+    element_box_kernels<S>(kernels_).elements({vertex_boxes, elements_->vertices.data(), corners_each_,
+                                               list_->ids(), count, room.boxes, room.centres, room.stride,
+                                               room.extent});
   builder_.build(tree_, order_, *list_);
   list_corners();
   surface_when_built_ = surface();
-  places_listed_ = false;
+  built_count_ = count;
+  places_listed_ = groups_listed_ = false;
   state_ = State::current;
   ++work_.builds;
 }
@@ -67,6 +85,8 @@ void ElementTree<S>::list_corners() {
   const std::uint32_t padded = tree_.padded_leaf_size(), leaves = tree_.leaf_count();
   const std::size_t size = std::size_t(leaves) * corners_each_ * padded;
   if (leaf_corners_.size() < size) leaf_corners_.resize(size);
+  if (leaf_ends_.size() < leaves) leaf_ends_.resize(leaves);
+  std::copy_n(tree_.leaf_lists().end_entry, leaves, leaf_ends_.begin());
   const std::uint32_t* const corners = elements_->vertices.data();
   for (std::uint32_t leaf = 0; leaf < leaves; ++leaf) {
     std::uint32_t* const to = leaf_corners_.data() + std::size_t(leaf) * corners_each_ * padded;
@@ -106,7 +126,7 @@ void ElementTree<S>::list_incidence(std::uint32_t vertices) {
 template <class S>
 void ElementTree<S>::list_places() {
   const WideArrays<S> arrays = tree_.arrays();
-  leaf_of_element_.resize(elements_->count());
+  leaf_of_element_.assign(elements_->count(), 0);  // of removed elements: any
   node_of_leaf_.resize(tree_.leaf_count());
   parents_.resize(tree_.node_count());
   parents_[0] = 0;
@@ -117,24 +137,20 @@ void ElementTree<S>::list_places() {
       parents_[node.first_child + lane - node.leaf_count] = n;
   }
   for (std::uint32_t leaf = 0; leaf < tree_.leaf_count(); ++leaf)
-    for (const std::uint32_t e : tree_.leaf_primitives(leaf)) leaf_of_element_[e] = leaf;
+    for (const std::uint32_t e : leaf_elements(leaf)) leaf_of_element_[e] = leaf;
   dirty_leaves_.assign((std::size_t(tree_.leaf_count()) + 63) / 64, 0);
   dirty_nodes_.assign((std::size_t(tree_.node_count()) + 63) / 64, 0);
   places_listed_ = true;
 }
 
 template <class S>
-bool ElementTree<S>::remake_leaf(const ElementBoxesJob<S>& boxes, std::uint32_t leaf) {
-  const std::uint32_t padded = tree_.padded_leaf_size();
-  const std::span<const std::uint32_t> ids = tree_.leaf_primitives(leaf);
-  element_box_kernels<S>(kernels_).listed(boxes, ids.data(), std::uint32_t(ids.size()));
-  const WideLeafLists lists = tree_.leaf_lists();
-  S* const own = tree_.leaf_boxes() + std::size_t(8) * leaf;
+bool ElementTree<S>::remake_leaf(ElementLeafBoxesJob<S>& job, std::uint32_t leaf) {
+  const S* const own = job.leaf_boxes + std::size_t(8) * leaf;
   S before[8];
   std::copy_n(own, 8, before);
-  build_kernels<S>(kernels_).leaf_rows[padded == 8 ? 2 : 3](
-      {room_.boxes, lists.primitives, lists.first_entry + leaf, lists.end_entry + leaf, 1,
-       tree_.leaves(nullptr).rows + leaf * lane_scalars(padded), own});
+  job.begin = leaf;
+  job.end = leaf + 1;
+  element_box_kernels<S>(kernels_).leaves(job);
   return !std::equal(before, before + 3, own) || !std::equal(before + 4, before + 7, own + 4);
 }
 
@@ -150,12 +166,18 @@ void ElementTree<S>::refit_moved(const S* vertex_boxes, std::uint32_t vertices,
       const std::uint32_t leaf = leaf_of_element_[elements_of_vertex_[i]];
       dirty_leaves_[leaf / 64] |= std::uint64_t(1) << leaf % 64;
     }
-  const ElementBoxesJob<S> boxes = job(vertex_boxes);
+  remake_marked(vertex_boxes);
+  ++work_.partial_refits;
+}
+
+template <class S>
+void ElementTree<S>::remake_marked(const S* vertex_boxes) {
+  ElementLeafBoxesJob<S> job = leaf_job(vertex_boxes);
   for (std::size_t word = 0; word < dirty_leaves_.size(); ++word)
     for (; dirty_leaves_[word] != 0; dirty_leaves_[word] &= dirty_leaves_[word] - 1) {
       const auto leaf = std::uint32_t(64 * word) + std::uint32_t(std::countr_zero(dirty_leaves_[word]));
       ++work_.leaves_remade;
-      if (!remake_leaf(boxes, leaf)) continue;
+      if (!remake_leaf(job, leaf)) continue;
       const std::uint32_t node = node_of_leaf_[leaf];
       dirty_nodes_[node / 64] |= std::uint64_t(1) << node % 64;
     }
@@ -163,21 +185,83 @@ void ElementTree<S>::refit_moved(const S* vertex_boxes, std::uint32_t vertices,
                          dirty_nodes_.data(), dirty_nodes_.size(), 0};
   element_box_kernels<S>(kernels_).nodes(nodes);
   work_.nodes_remade += nodes.remade;
-  ++work_.partial_refits;
+}
+
+template <class S>
+void ElementTree<S>::elements_removed(const S* vertex_boxes, std::span<const std::uint32_t> ids) {
+  if (state_ == State::unbuilt || tree_.empty()) return;
+  if (2 * elements_->live_count() < built_count_) return forget();
+  if (!places_listed_) list_places();
+  const std::uint32_t padded = tree_.padded_leaf_size();
+  for (const std::uint32_t id : ids) {
+    const std::uint32_t leaf = leaf_of_element_[id], begin = tree_.leaf_lists().first_entry[leaf];
+    std::uint32_t* const entries = tree_.entries();
+    const std::uint32_t* const found = std::find(entries + begin, entries + leaf_ends_[leaf], id);
+    KBVH_ASSERT(found != entries + leaf_ends_[leaf]);
+    // The last element of the leaf takes the place; unused lanes repeat the first one.
+    const auto lane = std::uint32_t(found - entries) - begin, last = --leaf_ends_[leaf] - begin;
+    entries[begin + lane] = entries[begin + last];
+    std::uint32_t* const corners = leaf_corners_.data() + std::size_t(leaf) * corners_each_ * padded;
+    for (std::uint32_t row = 0; row < corners_each_; ++row) {
+      corners[row * padded + lane] = corners[row * padded + last];
+      for (std::uint32_t unused = last; unused < padded; ++unused)
+        corners[row * padded + unused] = corners[row * padded];
+    }
+    dirty_leaves_[leaf / 64] |= std::uint64_t(1) << leaf % 64;
+  }
+  groups_listed_ = false;
+  if (state_ == State::current)
+    remake_marked(vertex_boxes);
+  else
+    std::fill(dirty_leaves_.begin(), dirty_leaves_.end(), 0);
+}
+
+template <class S>
+GroupArrays ElementTree<S>::groups(std::span<const GroupMask> of_elements) {
+  KBVH_ASSERT(state_ == State::current && !tree_.empty());
+  if (!groups_listed_) {
+    const WideArrays<S> arrays = tree_.arrays();
+    const std::uint32_t nodes = tree_.node_count();
+    group_children_.resize(std::size_t(16) * nodes);
+    group_nodes_.resize(std::size_t(2) * nodes);
+    for (std::uint32_t n = nodes; n-- > 0;) {
+      const WideNode& node = arrays.nodes[n];
+      std::uint32_t* const rows = group_children_.data() + std::size_t(16) * n;
+      GroupMask all{0, 0};
+      for (std::uint32_t lane = 0; lane < 8; ++lane) {
+        GroupMask child{0, 0};
+        if (lane < node.leaf_count) {
+          for (const std::uint32_t e : leaf_elements(node.first_leaf + lane))
+            child |= of_elements.empty() ? GroupMask{} : of_elements[e];
+        } else if (lane < node.count) {
+          const std::size_t at = std::size_t(2) * (node.first_child + lane - node.leaf_count);
+          child = {group_nodes_[at], group_nodes_[at + 1]};
+        }
+        rows[lane] = child.groups;
+        rows[8 + lane] = child.mask;
+        all |= child;
+      }
+      group_nodes_[std::size_t(2) * n] = all.groups;
+      group_nodes_[std::size_t(2) * n + 1] = all.mask;
+    }
+    groups_listed_ = true;
+  }
+  return {group_children_.data(), group_nodes_.data()};
 }
 
 template <class S>
 ElementLeaves<S> ElementTree<S>::leaves() {
   KBVH_ASSERT(state_ == State::current && !tree_.empty());
   const WideLeafLists lists = tree_.leaf_lists();
-  return {tree_.arrays(),   lists.first_entry,          lists.end_entry,
+  return {tree_.arrays(),   lists.first_entry,          leaf_ends_.data(),
           lists.primitives, tree_.leaves(nullptr).rows, leaf_corners_.data()};
 }
 
 template <class S>
 std::size_t ElementTree<S>::bytes() const {
   return order_.bytes() + builder_.bytes() + tree_.bytes() +
-         (leaf_corners_.capacity() + first_of_vertex_.capacity() + elements_of_vertex_.capacity() +
+         (leaf_corners_.capacity() + leaf_ends_.capacity() + group_children_.capacity() +
+          group_nodes_.capacity() + first_of_vertex_.capacity() + elements_of_vertex_.capacity() +
           leaf_of_element_.capacity() + node_of_leaf_.capacity() + parents_.capacity()) *
              sizeof(std::uint32_t) +
          (dirty_leaves_.capacity() + dirty_nodes_.capacity()) * sizeof(std::uint64_t);

@@ -6,6 +6,8 @@
 
 #include "core/broad_phase/kernels/element_boxes.hpp"
 #include "core/broad_phase/kernels/element_pairs.hpp"
+#include "core/broad_phase/kernels/group_traversal.hpp"
+#include "core/broad_phase/pair_filter.hpp"
 #include "core/families/build/curve_builders.hpp"
 
 namespace kbvh {
@@ -35,8 +37,21 @@ class ElementTree {
   /// elements at each vertex, O(corners).
   void refit_moved(const S* vertex_boxes, std::uint32_t vertices, std::span<const std::uint32_t> moved);
 
+  /// Takes further elements, whose list has grown: the next `refresh` builds another tree.
+  void elements_inserted();
+  /// Takes further vertices: elements are still the same.
+  void vertices_inserted() { first_of_vertex_.clear(); }
+  /// Takes elements out that have just been removed from their list: from their leaves, the boxes of which,
+  /// and of the nodes above, shrink; a tree that is not current only loses the elements. O(elements x
+  /// height).
+  void elements_removed(const S* vertex_boxes, std::span<const std::uint32_t> ids);
+
   /// Returns what searches read; the tree must be current and not empty.
   ElementLeaves<S> leaves();
+  /// Returns the groups of all elements, or of elements that all have the default, or-ed up the tree, which
+  /// must be current and not empty. O(elements) after a build or `forget_groups`, else O(1).
+  GroupArrays groups(std::span<const GroupMask> of_elements);
+  void forget_groups() { groups_listed_ = false; }
   bool empty() const { return tree_.empty(); }
   std::uint32_t padded_leaf_size() const { return tree_.padded_leaf_size(); }
   Box<S> root_box() const { return tree_.root_box(); }
@@ -50,13 +65,20 @@ class ElementTree {
   std::size_t bytes() const;
 
  private:
-  ElementBoxesJob<S> job(const S* vertex_boxes);
+  /// Returns the job that makes all leaves' boxes.
+  ElementLeafBoxesJob<S> leaf_job(const S* vertex_boxes);
   void build(const S* vertex_boxes);
   void list_corners();
   void list_incidence(std::uint32_t vertices);
   void list_places();
+  std::span<const std::uint32_t> leaf_elements(std::uint32_t leaf) const {
+    return {tree_.leaf_lists().primitives + tree_.leaf_lists().first_entry[leaf],
+            tree_.leaf_lists().primitives + leaf_ends_[leaf]};
+  }
+  /// Computes marked leaves and the nodes above as far as boxes change.
+  void remake_marked(const S* vertex_boxes);
   /// Computes the boxes of one leaf and its elements; returns whether the leaf's box changed.
-  bool remake_leaf(const ElementBoxesJob<S>& boxes, std::uint32_t leaf);
+  bool remake_leaf(ElementLeafBoxesJob<S>& job, std::uint32_t leaf);
   double surface();
 
   const Primitives* elements_ = nullptr;
@@ -67,8 +89,9 @@ class ElementTree {
   CurveOrder<S> order_;
   LinearBuilder<S> builder_;
   BuiltTree<S> tree_;
-  typename CurveOrder<S>::Room room_{};
   UnfilledArray<std::uint32_t> leaf_corners_;  // [leaf][corner][padded]
+  UnfilledArray<std::uint32_t> leaf_ends_;     // [leaf]: as in the tree, less what was removed since
+  std::uint32_t built_count_ = 0;              // elements when built
   double surface_when_built_ = 0;
   // For partial refits. Incidence is listed at the first one, places in the tree at the first one after a
   // build.
@@ -76,6 +99,8 @@ class ElementTree {
   std::vector<std::uint32_t> leaf_of_element_, node_of_leaf_, parents_;
   std::vector<std::uint64_t> dirty_leaves_, dirty_nodes_;
   bool places_listed_ = false;
+  UnfilledArray<std::uint32_t> group_children_, group_nodes_;
+  bool groups_listed_ = false;
   Work work_;
 };
 

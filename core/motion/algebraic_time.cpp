@@ -8,7 +8,7 @@
 
 namespace kbvh {
 
-using Integer = Polynomial::Integer;
+using Integer = Dyadic::Integer;
 
 namespace {
 
@@ -38,9 +38,10 @@ int lowest_bit(const Dyadic& value) {
 
 }  // namespace
 
-Polynomial Polynomial::from(std::span<const Dyadic> coefficients) {
-  KBVH_ASSERT(coefficients.size() <= 4);
-  Polynomial result;
+template <int most>
+BasicPolynomial<most> BasicPolynomial<most>::from(std::span<const Dyadic> coefficients) {
+  KBVH_ASSERT(coefficients.size() <= std::size_t(most) + 1);
+  BasicPolynomial result;
   std::optional<int> lowest;
   for (const Dyadic& value : coefficients)
     if (value.sign() != 0) lowest = std::min(lowest.value_or(lowest_bit(value)), lowest_bit(value));
@@ -51,42 +52,44 @@ Polynomial Polynomial::from(std::span<const Dyadic> coefficients) {
   return result;
 }
 
-Polynomial operator+(const Polynomial& a, const Polynomial& b) {
-  Polynomial result;
-  const int degree = std::max(a.degree_, b.degree_);
-  for (int i = 0; i <= degree; ++i) result.coefficient_[i] = a.coefficient_[i] + b.coefficient_[i];
+template <int most>
+BasicPolynomial<most> BasicPolynomial<most>::plus(const BasicPolynomial& other) const {
+  BasicPolynomial result;
+  const int degree = std::max(degree_, other.degree_);
+  for (int i = 0; i <= degree; ++i) result.coefficient_[i] = coefficient_[i] + other.coefficient_[i];
   result.set_degree(degree);
   return result;
 }
 
-Polynomial operator-(const Polynomial& a) {
-  Polynomial result = a;
-  for (int i = 0; i <= a.degree_; ++i) result.coefficient_[i] = -a.coefficient_[i];
+template <int most>
+BasicPolynomial<most> BasicPolynomial<most>::negative() const {
+  BasicPolynomial result = *this;
+  for (int i = 0; i <= degree_; ++i) result.coefficient_[i] = -coefficient_[i];
   return result;
 }
 
-Polynomial operator-(const Polynomial& a, const Polynomial& b) {
-  return a + -b;
-}
-
-Polynomial operator*(const Polynomial& a, const Polynomial& b) {
-  Polynomial result;
-  if (a.is_zero() || b.is_zero()) return result;
-  KBVH_ASSERT(a.degree_ + b.degree_ <= Polynomial::max_degree);
-  for (int i = 0; i <= a.degree_; ++i)
-    for (int j = 0; j <= b.degree_; ++j) result.coefficient_[i + j] += a.coefficient_[i] * b.coefficient_[j];
-  result.set_degree(a.degree_ + b.degree_);
+template <int most>
+BasicPolynomial<most> BasicPolynomial<most>::times(const BasicPolynomial& other) const {
+  BasicPolynomial result;
+  if (is_zero() || other.is_zero()) return result;
+  KBVH_ASSERT(degree_ + other.degree_ <= most);
+  for (int i = 0; i <= degree_; ++i)
+    for (int j = 0; j <= other.degree_; ++j)
+      result.coefficient_[i + j] += coefficient_[i] * other.coefficient_[j];
+  result.set_degree(degree_ + other.degree_);
   return result;
 }
 
-Polynomial Polynomial::derivative() const {
-  Polynomial result;
+template <int most>
+BasicPolynomial<most> BasicPolynomial<most>::derivative() const {
+  BasicPolynomial result;
   for (int i = 1; i <= degree_; ++i) result.coefficient_[i - 1] = coefficient_[i] * i;
   result.set_degree(degree_ - 1);
   return result;
 }
 
-void Polynomial::drop_powers_of_two() {
+template <int most>
+void BasicPolynomial<most>::drop_powers_of_two() {
   if (is_zero()) return;
   unsigned shift = ~0U;
   for (int i = 0; i <= degree_; ++i)
@@ -95,8 +98,21 @@ void Polynomial::drop_powers_of_two() {
   for (int i = 0; i <= degree_; ++i) coefficient_[i] >>= shift;  // exact: the shifted-out bits are zero
 }
 
-Polynomial Polynomial::remainder(const Polynomial& divisor) const {
-  Polynomial rest = *this;
+template <int most>
+void BasicPolynomial<most>::drop_common_factor() {
+  // Remainders of degree 6 grow to many times the length that they need, and a gcd of short numbers costs
+  // more than it saves.
+  constexpr unsigned long_bits = 2048;
+  if (is_zero() || msb(abs(coefficient_[degree_])) < long_bits) return;
+  Integer factor = abs(coefficient_[degree_]);
+  for (int i = 0; i < degree_ && msb(factor) != 0; ++i) factor = gcd(factor, coefficient_[i]);
+  if (msb(factor) == 0) return;
+  for (int i = 0; i <= degree_; ++i) coefficient_[i] /= factor;
+}
+
+template <int most>
+BasicPolynomial<most> BasicPolynomial<most>::remainder(const BasicPolynomial& divisor) const {
+  BasicPolynomial rest = *this;
   const Integer& leading = divisor.coefficient_[divisor.degree_];
   const Integer size = abs(leading);
   while (rest.degree_ >= divisor.degree_) {
@@ -110,13 +126,15 @@ Polynomial Polynomial::remainder(const Polynomial& divisor) const {
     rest.set_degree(rest.degree_ - 1);
   }
   rest.drop_powers_of_two();
+  if constexpr (most > 5) rest.drop_common_factor();
   return rest;
 }
 
-void Polynomial::divide_out(const Integer& numerator, const Integer& denominator) {
+template <int most>
+void BasicPolynomial<most>::divide_out(const Integer& numerator, const Integer& denominator) {
   while (degree_ >= 1) {
     // Horner's scheme on denominator^degree p(t), so that every quotient is an integer.
-    Polynomial quotient;
+    BasicPolynomial quotient;
     Integer carry = 0, power = 1;
     for (int i = degree_; i >= 1; --i) {
       carry = carry * numerator + coefficient_[i] * power;
@@ -136,7 +154,8 @@ void Polynomial::divide_out(const Integer& numerator, const Integer& denominator
   }
 }
 
-int Polynomial::sign_at(const Integer& numerator, unsigned exponent) const {
+template <int most>
+int BasicPolynomial<most>::sign_at(const Integer& numerator, unsigned exponent) const {
   if (is_zero()) return 0;
   Integer value = coefficient_[degree_];
   for (int i = degree_ - 1; i >= 0; --i)
@@ -144,14 +163,19 @@ int Polynomial::sign_at(const Integer& numerator, unsigned exponent) const {
   return value.sign();
 }
 
-int Polynomial::sign_throughout(const Integer& begin, const Integer& end, unsigned exponent) const {
-  KBVH_ASSERT(degree_ <= 3);
+template <int most>
+int BasicPolynomial<most>::sign_throughout(const Integer& begin, const Integer& end,
+                                           unsigned exponent) const {
+  constexpr int largest = 6;
+  KBVH_ASSERT(degree_ <= largest);
   if (is_zero()) return 0;
   // With t = (begin + (end - begin) s) / 2^exponent, times 2^(degree exponent): the coefficients of s^i, then
-  // 1, 2 or 6 times the Bernstein coefficients over 0 <= s <= 1.
-  constexpr int binomial[4][4] = {{1, 0, 0, 0}, {1, 1, 0, 0}, {1, 2, 1, 0}, {1, 3, 3, 1}};
+  // 60, which all binomials divide, times the Bernstein coefficients over 0 <= s <= 1.
+  constexpr int binomial[largest + 1][largest + 1] = {
+      {1, 0, 0, 0, 0, 0, 0}, {1, 1, 0, 0, 0, 0, 0},   {1, 2, 1, 0, 0, 0, 0},   {1, 3, 3, 1, 0, 0, 0},
+      {1, 4, 6, 4, 1, 0, 0}, {1, 5, 10, 10, 5, 1, 0}, {1, 6, 15, 20, 15, 6, 1}};
   const Integer length = end - begin;
-  Integer power[4], length_power = 1;
+  Integer power[largest + 1], length_power = 1;
   for (int i = 0; i <= degree_; ++i) {
     Integer sum = 0, begin_power = 1;
     for (int j = i; j <= degree_; ++j) {
@@ -164,7 +188,7 @@ int Polynomial::sign_throughout(const Integer& begin, const Integer& end, unsign
   int throughout = 0;
   for (int k = 0; k <= degree_; ++k) {
     Integer sum = 0;
-    for (int i = 0; i <= k; ++i) sum += power[i] * (6 * binomial[k][i] / binomial[degree_][i]);
+    for (int i = 0; i <= k; ++i) sum += power[i] * (60 * binomial[k][i] / binomial[degree_][i]);
     const int sign = sum.sign();
     if (k == 0) throughout = sign;
     const bool outer = k == 0 || k == degree_;
@@ -186,21 +210,23 @@ int compare(const DyadicTime& a, const DyadicTime& b) {
   return x.compare(y);
 }
 
-SturmSequence::SturmSequence(const Polynomial& p, const Polynomial& h) {
+template <class P>
+BasicSturmSequence<P>::BasicSturmSequence(const P& p, const P& h) {
   sequence_.push_back(p);
   if (h.is_zero()) return;
   sequence_.push_back(h);
   for (;;) {
     const std::size_t n = sequence_.size();
-    Polynomial next = -sequence_[n - 2].remainder(sequence_[n - 1]);
+    P next = -sequence_[n - 2].remainder(sequence_[n - 1]);
     if (next.is_zero()) return;
     sequence_.push_back(std::move(next));
   }
 }
 
-int SturmSequence::variations(const DyadicTime& t) const {
+template <class P>
+int BasicSturmSequence<P>::variations(const DyadicTime& t) const {
   int changes = 0, last = 0;
-  for (const Polynomial& p : sequence_) {
+  for (const P& p : sequence_) {
     const int sign = p.sign_at(t.numerator, t.exponent);
     if (sign == 0) continue;
     if (last != 0 && sign != last) ++changes;
@@ -209,14 +235,16 @@ int SturmSequence::variations(const DyadicTime& t) const {
   return changes;
 }
 
-double AlgebraicTime::rounded(const DyadicTime& t, unsigned up) {
+template <class P>
+double BasicAlgebraicTime<P>::rounded(const DyadicTime& t, unsigned up) {
   constexpr unsigned bits = 50;
   if (t.exponent <= bits) return std::ldexp(t.numerator.convert_to<double>(), -int(t.exponent));
   const Integer below = t.numerator >> (t.exponent - bits);
   return std::ldexp(Integer(below + up).convert_to<double>(), -int(bits));
 }
 
-AlgebraicTime::AlgebraicTime(const Polynomial& p, DyadicTime begin, DyadicTime end)
+template <class P>
+BasicAlgebraicTime<P>::BasicAlgebraicTime(const P& p, DyadicTime begin, DyadicTime end)
     : p_(p), begin_(std::move(begin)), end_(std::move(end)) {
   const unsigned exponent = std::max(begin_.exponent, end_.exponent);
   for (DyadicTime* t : {&begin_, &end_}) {
@@ -225,31 +253,34 @@ AlgebraicTime::AlgebraicTime(const Polynomial& p, DyadicTime begin, DyadicTime e
   }
 }
 
-int AlgebraicTime::sign(const Polynomial& q) const {
+template <class P>
+int BasicAlgebraicTime<P>::sign(const P& q) const {
   if (q.is_zero()) return 0;
   if (dyadic_) return q.sign_at(begin_.numerator, begin_.exponent);
   if (const int sign = q.sign_throughout(begin_.numerator, end_.numerator, begin_.exponent)) return sign;
   // A Tarski query; p' q may be reduced modulo p, which preserves the Cauchy index.
-  const Polynomial h = (p_.derivative() * q).remainder(p_);
-  return SturmSequence(p_, h).index(begin_, end_);
+  const P h = (p_.derivative() * q).remainder(p_);
+  return BasicSturmSequence<P>(p_, h).index(begin_, end_);
 }
 
-int AlgebraicTime::compare_to(const DyadicTime& t) const {
+template <class P>
+int BasicAlgebraicTime<P>::compare_to(const DyadicTime& t) const {
   if (dyadic_) return compare(begin_, t);
   if (compare(t, begin_) <= 0) return 1;
   if (compare(t, end_) >= 0) return -1;
-  const Polynomial line = Polynomial::line(-t.numerator, (Integer(1) << t.exponent) - t.numerator);
+  const P line = P::line(-t.numerator, (Integer(1) << t.exponent) - t.numerator);
   return sign(line);
 }
 
-int AlgebraicTime::compare_to(AlgebraicTime other) const {
+template <class P>
+int BasicAlgebraicTime<P>::compare_to(BasicAlgebraicTime other) const {
   if (other.dyadic_) return compare_to(other.begin_);
   if (dyadic_) return -other.compare_to(begin_);
   if (compare(end_, other.begin_) <= 0) return -1;
   if (compare(other.end_, begin_) <= 0) return 1;
   // The only root of the other's polynomial in its interval is the other number.
   if (sign(other.p_) == 0 && compare_to(other.begin_) > 0 && compare_to(other.end_) < 0) return 0;
-  AlgebraicTime mine = *this;
+  BasicAlgebraicTime mine = *this;
   for (int bits = std::max(mine.width_bits(), other.width_bits());;) {
     bits = std::max(bits, 0) + 32;
     mine.refine(unsigned(bits));
@@ -260,19 +291,21 @@ int AlgebraicTime::compare_to(AlgebraicTime other) const {
   }
 }
 
-int AlgebraicTime::width_bits() const {
+template <class P>
+int BasicAlgebraicTime<P>::width_bits() const {
   const Integer length = end_.numerator - begin_.numerator;
   if (length.is_zero()) return std::numeric_limits<int>::max();
   const int above = int(msb(length)) + (msb(length) == lsb(length) ? 0 : 1);
   return int(begin_.exponent) - above;
 }
 
-void AlgebraicTime::refine(unsigned bits) {
+template <class P>
+void BasicAlgebraicTime<P>::refine(unsigned bits) {
   if (dyadic_ || width_bits() >= int(bits)) return;
   // At a root of odd multiplicity the sign changes; only the number of roots reveals the others.
   const int before = p_.sign_at(begin_.numerator, begin_.exponent);
   const bool crossing = before != p_.sign_at(end_.numerator, end_.exponent);
-  std::optional<SturmSequence> roots;
+  std::optional<BasicSturmSequence<P>> roots;
   if (!crossing) roots.emplace(p_, p_.derivative());
   for (int rest = int(bits) - width_bits(); rest > 0; --rest) {
     const DyadicTime centre = middle(begin_, end_);
@@ -292,13 +325,14 @@ void AlgebraicTime::refine(unsigned bits) {
   }
 }
 
-void append_inner_roots(Polynomial p, std::vector<AlgebraicTime>& roots) {
+template <class P>
+void append_inner_roots(P p, std::vector<BasicAlgebraicTime<P>>& roots) {
   p.divide_out(0, 1);
   p.divide_out(1, 1);
   // A root in the middle of an interval is divided out of the polynomial, and the search restarts.
   for (bool again = true; again && p.degree() >= 1;) {
     again = false;
-    const SturmSequence count(p, p.derivative());
+    const BasicSturmSequence<P> count(p, p.derivative());
     std::vector<DyadicTime> begins{{0, 0}}, found;  // intervals of length 2^-exponent
     while (!begins.empty() && !again) {
       const DyadicTime begin = begins.back();
@@ -324,5 +358,14 @@ void append_inner_roots(Polynomial p, std::vector<AlgebraicTime>& roots) {
       roots.emplace_back(p, begin, DyadicTime{begin.numerator + 1, begin.exponent});
   }
 }
+
+template class BasicPolynomial<5>;
+template class BasicPolynomial<11>;
+template class BasicSturmSequence<Polynomial>;
+template class BasicSturmSequence<LongPolynomial>;
+template class BasicAlgebraicTime<Polynomial>;
+template class BasicAlgebraicTime<LongPolynomial>;
+template void append_inner_roots(Polynomial, std::vector<BasicAlgebraicTime<Polynomial>>&);
+template void append_inner_roots(LongPolynomial, std::vector<BasicAlgebraicTime<LongPolynomial>>&);
 
 }  // namespace kbvh

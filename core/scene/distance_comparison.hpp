@@ -1,25 +1,24 @@
 #pragma once
 #include <cmath>
 
+#include "core/geometry/predicates.hpp"
 #include "core/motion/exact_arithmetic.hpp"
 
 namespace kbvh {
 
 /// A double with a bound on its distance from the real number that it stands for. Sums and products take a
 /// few operations; the bound covers its own rounding, too.
-class BoundedDouble {
+class Bounded {
  public:
-  BoundedDouble() = default;
-  BoundedDouble(double value) : value_(value) {}  // NOLINT(google-explicit-constructor): formulas read better
+  Bounded() = default;
+  Bounded(double value) : value_(value) {}  // NOLINT(google-explicit-constructor): formulas read better
 
-  friend BoundedDouble operator+(const BoundedDouble& a, const BoundedDouble& b) {
+  friend Bounded operator+(const Bounded& a, const Bounded& b) {
     const double sum = a.value_ + b.value_;
     return {sum, (a.error_ + b.error_ + std::fabs(sum) * unit) * slack + tiny};
   }
-  friend BoundedDouble operator-(const BoundedDouble& a, const BoundedDouble& b) {
-    return a + BoundedDouble(-b.value_, b.error_);
-  }
-  friend BoundedDouble operator*(const BoundedDouble& a, const BoundedDouble& b) {
+  friend Bounded operator-(const Bounded& a, const Bounded& b) { return a + Bounded(-b.value_, b.error_); }
+  friend Bounded operator*(const Bounded& a, const Bounded& b) {
     const double product = a.value_ * b.value_;
     const double error = std::fabs(a.value_) * b.error_ + std::fabs(b.value_) * a.error_ +
                          a.error_ * b.error_ + std::fabs(product) * unit;
@@ -34,7 +33,7 @@ class BoundedDouble {
   }
 
  private:
-  BoundedDouble(double value, double error) : value_(value), error_(error) {}
+  Bounded(double value, double error) : value_(value), error_(error) {}
   // Half an ulp of the result; the few roundings within a bound; products that underflow, in the value or in
   // the bound.
   static constexpr double unit = 0x1p-53, slack = 1 + 0x1p-49, tiny = 0x1p-1060;
@@ -44,9 +43,9 @@ class BoundedDouble {
 /// Distances of elements against one distance, in numbers of type T. A sign that T leaves undecided is noted,
 /// and the verdict means nothing then.
 template <class T>
-class DistanceComparison {
+class Comparison {
  public:
-  explicit DistanceComparison(double distance) : squared_(T(distance) * T(distance)) {}
+  explicit Comparison(double distance) : squared_(T(distance) * T(distance)) {}
   bool undecided() const { return undecided_; }
 
   struct Point {

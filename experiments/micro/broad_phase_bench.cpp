@@ -1,7 +1,8 @@
 // The time of kbvh::broad_phase relative to other ways to the same pairs, in one run and by turns: swept
 // vertex-face and edge-edge candidates between two frames from scratch and with a known tree, iterates within
-// a bound, and updates of few vertices. Prints medians of processor time in ms, and ratios.
-//   kbvh_broad_phase_bench [FRAMES] [REPETITIONS]
+// a bound, updates of few vertices, and candidates between groups. Prints medians of processor time in ms and
+// ratios, and compares them with targets; FILE receives all times, ratios and targets.
+//   kbvh_broad_phase_bench [FRAMES] [REPETITIONS] [FILE]
 // FRAMES is a folder with a pair of frames (default: cloth-ball of the data folder).
 #include <algorithm>
 #include <cmath>
@@ -9,7 +10,11 @@
 #include <cstdlib>
 #include <ctime>
 #include <filesystem>
+#include <fstream>
 #include <functional>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -18,6 +23,7 @@
 #include "core/families/sweep/sorted_boxes.hpp"
 #include "core/judge/session.hpp"
 #include "experiments/common/environment.hpp"
+#include "experiments/common/machine.hpp"
 #include "experiments/study/box_candidates.hpp"
 #include "experiments/study/contestants.hpp"
 
@@ -37,26 +43,93 @@ struct Contestant {
   std::size_t pairs = 0;
 };
 
-/// Plays all contestants once without a clock, then by turns, and prints medians and how many times as long
-/// as the first each one takes.
-void compare(const char* title, std::vector<Contestant> contestants, int repetitions) {
-  for (int r = -1; r < repetitions; ++r)
+/// What was compared in this run, for the file and for targets.
+class Table {
+ public:
+  /// Plays all contestants once without a clock, then by turns, and prints medians and how many times as long
+  /// as the first each one takes.
+  void compare(const std::string& title, std::vector<Contestant> contestants, int repetitions) {
+    for (int r = -1; r < repetitions; ++r)
+      for (Contestant& contestant : contestants) {
+        const double begin = milliseconds();
+        contestant.pairs = contestant.work();
+        const double took = milliseconds() - begin;
+        if (r >= 0) contestant.ms.push_back(took);
+      }
+    std::printf("%s\n", title.c_str());
+    nlohmann::json rows = nlohmann::json::array();
+    double first = 0;
     for (Contestant& contestant : contestants) {
-      const double begin = milliseconds();
-      contestant.pairs = contestant.work();
-      const double took = milliseconds() - begin;
-      if (r >= 0) contestant.ms.push_back(took);
+      std::sort(contestant.ms.begin(), contestant.ms.end());
+      const double median = contestant.ms[contestant.ms.size() / 2];
+      if (first == 0) first = median;
+      medians_[contestant.name] = median;
+      std::printf("  %-56s %10.3f ms  %7.2f x  %zu pairs\n", contestant.name.c_str(), median, median / first,
+                  contestant.pairs);
+      rows.push_back({{"name", contestant.name},
+                      {"median_ms", median},
+                      {"ms", contestant.ms},
+                      {"over_first", median / first},
+                      {"pairs", contestant.pairs}});
     }
-  std::printf("%s\n", title);
-  double first = 0;
-  for (Contestant& contestant : contestants) {
-    std::sort(contestant.ms.begin(), contestant.ms.end());
-    const double median = contestant.ms[contestant.ms.size() / 2];
-    if (first == 0) first = median;
-    std::printf("  %-52s %10.3f ms  %7.2f x  %zu pairs\n", contestant.name.c_str(), median, median / first,
-                contestant.pairs);
+    comparisons_.push_back({{"title", title}, {"contestants", rows}});
   }
-}
+
+  /// Compares how many times as long as `ours` the rival takes with what is at least asked for, and with the
+  /// aim; 0: none is. Does nothing if one of them was not measured.
+  void target(const char* what, const std::string& ours, const std::string& rival, double at_least,
+              double aim) {
+    if (!medians_.contains(ours) || !medians_.contains(rival)) return;
+    const double ratio = medians_.at(rival) / medians_.at(ours);
+    const char* const verdict = at_least == 0      ? "reported"
+                                : ratio < at_least ? "missed"
+                                : ratio < aim      ? "met"
+                                                   : "met, and the aim";
+    targets_.push_back({{"what", what},
+                        {"ours", ours},
+                        {"rival", rival},
+                        {"ratio", ratio},
+                        {"at_least", at_least},
+                        {"aim", aim},
+                        {"verdict", verdict}});
+  }
+  void not_measured(const char* what, const char* why) {
+    targets_.push_back({{"what", what}, {"ratio", nullptr}, {"verdict", "not measured"}, {"why", why}});
+  }
+
+  void print_targets() const {
+    std::printf("Targets\n");
+    for (const nlohmann::json& target : targets_) {
+      const std::string what = target["what"], verdict = target["verdict"];
+      if (target["ratio"].is_null())
+        std::printf("  %-78s %s: %s\n", what.c_str(), verdict.c_str(),
+                    target["why"].get<std::string>().c_str());
+      else
+        std::printf("  %-78s %7.2f x  (%g, aim %g): %s\n", what.c_str(), target["ratio"].get<double>(),
+                    target["at_least"].get<double>(), target["aim"].get<double>(), verdict.c_str());
+    }
+  }
+  void write(const std::filesystem::path& file, const std::string& frames, int repetitions) const {
+    const nlohmann::json result{{"program", "kbvh_broad_phase_bench"},
+                                {"time", now_utc()},
+                                {"commit", commit()},
+                                {"dirty", dirty()},
+                                {"machine", machine()},
+                                {"kernels", name(active_kernel_set())},
+                                {"frames", frames},
+                                {"repetitions", repetitions},
+                                {"clock", "processor time, median of repetitions by turns, one thread"},
+                                {"comparisons", comparisons_},
+                                {"targets", targets_}};
+    std::ofstream out(file);
+    out << result.dump(2) << '\n';
+    if (!out.flush()) throw std::runtime_error("cannot write " + file.string());
+  }
+
+ private:
+  std::map<std::string, double> medians_;
+  nlohmann::json comparisons_ = nlohmann::json::array(), targets_ = nlohmann::json::array();
+};
 
 template <class S>
 struct Mesh {
@@ -159,7 +232,7 @@ class Sweep {
   std::vector<FoundPair> chunk_;
 };
 
-void swept(const FramePair& frames, int repetitions) {
+void swept(const FramePair& frames, int repetitions, Table& table) {
   const Mesh<double> mesh(frames);
   const Mesh<float> mesh_float(frames);
   BroadPhase<double> known;
@@ -193,12 +266,58 @@ void swept(const FramePair& frames, int repetitions) {
                            const BoxCandidates found = box_candidates(frames, BoxMargin::none);
                            return std::size_t(found.vertex_face + found.edge_edge);
                          }});
-  compare("Swept vertex-face and edge-edge candidates between two frames", std::move(contestants),
-          repetitions);
+  table.compare("Swept vertex-face and edge-edge candidates between two frames", std::move(contestants),
+                repetitions);
+}
+
+/// Candidates between the two largest connected parts of a mesh, chosen by groups within the search or
+/// afterwards.
+void between_parts(const FramePair& frames, int repetitions, Table& table) {
+  const Mesh<double> mesh(frames);
+  const auto vertices = std::uint32_t(mesh.v[0].size() / 3);
+  std::vector<std::uint32_t> part(vertices), sizes(vertices, 0);
+  std::iota(part.begin(), part.end(), 0U);
+  const auto root = [&](std::uint32_t v) {
+    while (part[v] != v) v = part[v] = part[part[v]];
+    return v;
+  };
+  for (const auto& face : frames.faces)
+    for (const std::uint32_t v : face) part[root(v)] = root(face[0]);
+  for (std::uint32_t v = 0; v < vertices; ++v) ++sizes[root(v)];
+  const auto largest = std::uint32_t(std::max_element(sizes.begin(), sizes.end()) - sizes.begin());
+  std::vector<GroupMask> groups;
+  std::vector<std::uint32_t> groups_of_edges;
+  for (std::uint32_t v = 0; v < vertices; ++v)
+    groups.push_back(root(v) == largest ? GroupMask{1, 2} : GroupMask{2, 1});
+  for (const auto& edge : frames.edges) groups_of_edges.push_back(groups[edge[0]].groups);
+  BroadPhase<double> grouped, all;
+  CandidateBuffer out[2];
+  for (BroadPhase<double>* const broad : {&grouped, &all}) {
+    broad->build(mesh.view(0), mesh.view(1), mesh.e, mesh.f);
+    broad->candidates(CandidateKind::edge_edge);
+  }
+  grouped.set_vertex_groups(groups);
+  table.compare("Edge-edge candidates between the largest connected part and the others",
+                {{"groups",
+                  [&] {
+                    grouped.update(mesh.view(0), mesh.view(1));
+                    grouped.detect_edge_edge_candidates(out[0]);
+                    return out[0].size();
+                  }},
+                 {"a list of all candidates, sifted",
+                  [&] {
+                    all.update(mesh.view(0), mesh.view(1));
+                    all.detect_edge_edge_candidates(out[1]);
+                    std::erase_if(out[1], [&](const Candidate& pair) {
+                      return groups_of_edges[pair.first] == groups_of_edges[pair.second];
+                    });
+                    return out[1].size();
+                  }}},
+                repetitions);
 }
 
 /// Solver iterates: 20 steps of a tenth of a mean edge, of which each vertex makes its own.
-void iterates(const FramePair& frames, int repetitions) {
+void iterates(const FramePair& frames, int repetitions, Table& table) {
   const Mesh<double> mesh(frames);
   double edge = 0;
   for (const auto& [a, b] : frames.edges) {
@@ -226,35 +345,35 @@ void iterates(const FramePair& frames, int repetitions) {
   bounded.valid_for(0.1 * edge);
   std::size_t sum = 0;
   std::uint64_t detections = 0;
-  compare("20 iterates of a solver step",
-          {{"valid_for(a tenth of an edge)",
-            [&] {
-              sum = 0;
-              bounded.forget_trees();
-              const std::uint64_t before = bounded.detections();
-              for (const auto& v : positions) {
-                bounded.update(view(v));
-                sum += bounded.candidates(CandidateKind::face_vertex).size() +
-                       bounded.candidates(CandidateKind::edge_edge).size();
-              }
-              detections = bounded.detections() - before;
-              return sum;
-            }},
-           {"detection at each",
-            [&] {
-              sum = 0;
-              for (const auto& v : positions) {
-                each.update(view(v));
-                sum += detect_both(each, out);
-              }
-              return sum;
-            }}},
-          repetitions);
+  table.compare("20 iterates of a solver step",
+                {{"valid_for(a tenth of an edge)",
+                  [&] {
+                    sum = 0;
+                    bounded.forget_trees();
+                    const std::uint64_t before = bounded.detections();
+                    for (const auto& v : positions) {
+                      bounded.update(view(v));
+                      sum += bounded.candidates(CandidateKind::face_vertex).size() +
+                             bounded.candidates(CandidateKind::edge_edge).size();
+                    }
+                    detections = bounded.detections() - before;
+                    return sum;
+                  }},
+                 {"detection at each",
+                  [&] {
+                    sum = 0;
+                    for (const auto& v : positions) {
+                      each.update(view(v));
+                      sum += detect_both(each, out);
+                    }
+                    return sum;
+                  }}},
+                repetitions);
   std::printf("  searches of the first: %llu of 40\n", (unsigned long long)detections);
 }
 
 /// A sheet of n x n vertices, of which some move.
-void moved(std::uint32_t n, int repetitions) {
+void moved(std::uint32_t n, int repetitions, Table& table) {
   std::vector<float> v;
   std::vector<std::uint32_t> e, f;
   for (std::uint32_t y = 0; y < n; ++y)
@@ -290,29 +409,29 @@ void moved(std::uint32_t n, int repetitions) {
   };
   const std::string title =
       "1 % of " + std::to_string(n * n) + " vertices moved, all three trees made current";
-  compare(title.c_str(),
-          {{"update(V), whole refit",
-            [&] {
-              shift(patch);
-              broad[0].update(view());
-              broad[0].refresh();
-              return std::size_t(0);
-            }},
-           {"update(V, moved), one patch",
-            [&] {
-              shift(patch);
-              broad[1].update(view(), patch);
-              broad[1].refresh();
-              return std::size_t(0);
-            }},
-           {"update(V, moved), scattered",
-            [&] {
-              shift(scattered);
-              broad[2].update(view(), scattered);
-              broad[2].refresh();
-              return std::size_t(0);
-            }}},
-          10 * repetitions);
+  table.compare(title,
+                {{"update(V), whole refit",
+                  [&] {
+                    shift(patch);
+                    broad[0].update(view());
+                    broad[0].refresh();
+                    return std::size_t(0);
+                  }},
+                 {"update(V, moved), one patch",
+                  [&] {
+                    shift(patch);
+                    broad[1].update(view(), patch);
+                    broad[1].refresh();
+                    return std::size_t(0);
+                  }},
+                 {"update(V, moved), scattered",
+                  [&] {
+                    shift(scattered);
+                    broad[2].update(view(), scattered);
+                    broad[2].refresh();
+                    return std::size_t(0);
+                  }}},
+                10 * repetitions);
 }
 
 int run(int argc, char** argv) {
@@ -320,16 +439,44 @@ int run(int argc, char** argv) {
       argc > 1 ? std::filesystem::path(argv[1]) : data_folder() / "ccd" / "frames" / "cloth-ball";
   const int repetitions = argc > 2 ? std::max(1, std::atoi(argv[2])) : 5;
   std::printf("kernels: %s\n", name(active_kernel_set()));
+  Table table;
+  std::string scene = "none";
   if (is_frame_pair(folder)) {
     const FramePair frames = read_frame_pair(folder);
+    scene = frames.name;
     std::printf("%s: %zu vertices, %zu edges, %zu faces\n", frames.name.c_str(),
                 frames.positions[0].size() / 3, frames.edges.size(), frames.faces.size());
-    swept(frames, repetitions);
-    iterates(frames, repetitions);
+    swept(frames, repetitions, table);
+    iterates(frames, repetitions, table);
+    between_parts(frames, repetitions, table);
   } else {
     std::printf("no pair of frames in %s\n", folder.c_str());
   }
-  moved(538, repetitions);
+  moved(538, repetitions, table);
+
+  const std::string scratch = "kbvh::broad_phase, double, new object and buffers";
+  const std::string known = "kbvh::broad_phase, double, known tree";
+  table.target("swept candidates from scratch, over sort and sweep", scratch,
+               "sort and sweep (SIMD), from scratch", 3, 10);
+  table.target("swept candidates from scratch, over a refit of a scene of features", scratch,
+               "bottom_up on a scene of features, from scratch", 1.5, 3);
+  table.target("swept candidates with a known tree, over sort and sweep with a known order", known,
+               "sort and sweep (SIMD), known order", 0, 0);
+  table.target("iterates of a solver, over detection at each", "valid_for(a tenth of an edge)",
+               "detection at each", 4, 10);
+  table.target("candidates between groups, over a list of all that is sifted", "groups",
+               "a list of all candidates, sifted", 0, 0);
+  table.target("update(V, moved) of 1 %, one patch, over a whole refit", "update(V, moved), one patch",
+               "update(V), whole refit", 10, 40);
+  table.target("update(V, moved) of 1 %, scattered, over a whole refit", "update(V, moved), scattered",
+               "update(V), whole refit", 0, 0);
+  table.not_measured("swept candidates with a known tree, over a scene of features with a known tree",
+                     "a session of a scene starts over to sweep again");
+  table.not_measured("swept candidates, over boxes of CGAL and trees of Bullet and Embree",
+                     "the adapters of peers have no swept pairs");
+  table.not_measured("exact self pairs, normal cones over none", "there are no cones");
+  table.print_targets();
+  if (argc > 3) table.write(argv[3], scene, repetitions);
   return 0;
 }
 

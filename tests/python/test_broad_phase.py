@@ -91,6 +91,94 @@ class Candidates(unittest.TestCase):
         self.assertEqual(broad.detections, before + 2)
 
 
+class Filters(unittest.TestCase):
+    def test_groups_pairs_and_functions(self):
+        v, edges, faces = sheet(10, 6)
+        broad = kbvh.BroadPhase()
+        broad.build(v, edges, faces, radius=0.125)
+        every = all_pairs("edge_edge", v, edges, faces, 0.125)
+        parity = np.arange(len(edges)) % 2
+        broad.set_groups("edge", groups=1 << parity, masks=2 >> parity)
+        odd = {pair for pair in every if sum(pair) % 2 == 1}
+        self.assertEqual(pairs(broad.candidates("edge_edge")), odd)
+        some = sorted(odd)[:5]
+        broad.exclude("edge_edge", [(b, a) for a, b in some])
+        self.assertEqual(pairs(broad.candidates("edge_edge")), odd - set(some))
+        broad.exclude("edge_edge", [])
+        broad.keep_only(lambda kind, found: (found[:, 0] > 40) & (kind == "edge_edge"))
+        self.assertEqual(pairs(broad.candidates("edge_edge")), {pair for pair in odd if pair[0] > 40})
+        broad.keep_only(None)
+        broad.set_groups("edge", [], [])
+        broad.set_vertex_groups(groups=np.ones(len(v), int), masks=np.full(len(v), 2))
+        self.assertEqual(len(broad.candidates("face_face")), 0)
+        broad.clear_filters()
+        self.assertEqual(pairs(broad.candidates("edge_edge")), every)
+
+    def test_functions_that_fail(self):
+        v, edges, faces = sheet(10, 6)
+        broad = kbvh.BroadPhase()
+        broad.build(v, edges, faces, radius=0.125)
+        broad.keep_only(lambda kind, found: [1] / 0)
+        with self.assertRaises(TypeError):
+            broad.candidates("edge_edge")
+        broad.keep_only(lambda kind, found: found)
+        with self.assertRaisesRegex(ValueError, "truth values"):
+            broad.candidates("edge_edge")
+        broad.keep_only(lambda kind, found: np.ones(len(found) - 1, bool))
+        with self.assertRaisesRegex(ValueError, "truth values"):
+            broad.candidates("edge_edge")
+        with self.assertRaisesRegex(ValueError, "99999"):
+            broad.exclude("edge_edge", [[0, 99999]])
+        broad.keep_only(None)
+        self.assertEqual(pairs(broad.candidates("edge_edge")), all_pairs("edge_edge", v, edges, faces, 0.125))
+
+
+class Edits(unittest.TestCase):
+    def test_elements_and_changes(self):
+        v, edges, faces = sheet(10, 7)
+        broad = kbvh.BroadPhase()
+        broad.build(v, edges, faces, radius=0.125)
+        every = all_pairs("edge_edge", v, edges, faces, 0.125)
+        begun, ended = broad.changes("edge_edge")
+        self.assertEqual((pairs(begun), len(ended)), (every, 0))
+        self.assertEqual(pairs(broad.changes("edge_edge", distance=0.125).begun), pairs(broad.within("edge_edge", 0.125)))
+        gone = {int(begun[0, 0]), int(begun[-1, 1])}
+        broad.remove("edge", sorted(gone))
+        changes = broad.changes("edge_edge")
+        self.assertEqual(pairs(changes.ended), {pair for pair in every if gone & set(pair)})
+        self.assertEqual(len(changes.begun), 0)
+        self.assertEqual(broad.insert(v[:1] + 0.25, edges=[[100, 5]]), (100, len(edges), len(faces)))
+        w = np.concatenate([v, v[:1] + 0.25])
+        broad.update(w)
+        every = all_pairs("edge_edge", w, np.concatenate([edges, [[100, 5]]]), faces, 0.125)
+        self.assertEqual(pairs(broad.candidates("edge_edge")), {pair for pair in every if not gone & set(pair)})
+        self.assertEqual(broad.insert(faces=[[0, 1, 100]]), (101, len(edges) + 1, len(faces)))
+        for wrong, call in (
+            ("removed before", lambda: broad.remove("edge", sorted(gone))),
+            ("vertex, an edge or a face", lambda: broad.remove("corner", [1])),
+            ("names vertex 101 of 101", lambda: broad.insert(edges=[[0, 101]])),
+        ):
+            with self.assertRaisesRegex(ValueError, wrong):
+                call()
+
+    def test_earliest_impacts(self):
+        v = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.25, 0.25, 8.0]])
+        w = v * [1, 1, 0]
+        broad = kbvh.BroadPhase()
+        broad.build(v, [], [[0, 1, 2]], radius=2, v1=w)
+        for separation in (0, 0.5, 2):
+            impact = broad.earliest_impact(separation)
+            self.assertEqual((impact.kind, impact.first, impact.second), ("face_vertex", 0, 3))
+            self.assertTrue(impact.begin <= 1 - separation / 8 <= impact.end)
+        broad.update(v, v - [0, 0, 1])
+        self.assertIsNone(broad.earliest_impact(2))
+        with self.assertRaisesRegex(ValueError, "separation from 0 to the radius 2"):
+            broad.earliest_impact(3)
+        broad.update(v)
+        with self.assertRaisesRegex(ValueError, "without a motion"):
+            broad.earliest_impact()
+
+
 class Errors(unittest.TestCase):
     def test_name_what_is_wrong(self):
         v, edges, faces = sheet(4, 5)

@@ -389,11 +389,16 @@ std::uint64_t allocations_of_a_round(BroadPhase<S>& broad, CandidateBuffer& foun
                              second = broad_phase::crumpled<S>(24, 2);
   const std::vector<std::uint32_t> moved{3, 5, 100};
   const std::vector<S> bounds(first.vertex_count(), S(0.01));
+  std::vector<GroupMask> groups(first.vertex_count());
+  for (std::size_t v = 0; v < groups.size(); v += 3) groups[v] = {2, 1};
+  const std::vector<Candidate> excluded{{1, 500}, {40, 2}};
   const std::uint64_t before = allocations;
   const auto ask = [&] {
     for (const CandidateKind kind : candidate_kinds) {
       broad.detect(kind, found);
       broad.within(kind, S(0.05), found);
+      broad.changes(kind);
+      broad.changes_within(kind, S(0.05));
     }
   };
   broad.update(second.begin());
@@ -410,6 +415,10 @@ std::uint64_t allocations_of_a_round(BroadPhase<S>& broad, CandidateBuffer& foun
   broad.valid_for(S(0));
   broad.forget_trees();
   ask();
+  broad.set_vertex_groups(groups);
+  broad.exclude(CandidateKind::edge_edge, excluded);
+  ask();
+  broad.clear_filters();
   return allocations - before;
 }
 

@@ -97,5 +97,139 @@ TEST(BroadPhaseInC, ErrorsAreTexts) {
   EXPECT_EQ(count, brute_force(mesh, CandidateKind::edge_edge, 0.1F).size());
 }
 
+CandidateBuffer list_of(const std::uint32_t* pairs, std::size_t count) {
+  CandidateBuffer list;
+  for (std::size_t i = 0; i < count; ++i) list.push_back({pairs[2 * i], pairs[2 * i + 1]});
+  return list;
+}
+
+TEST(BroadPhaseInC, FiltersAndEdits) {
+  const Mesh<double> mesh = crumpled<double>(12, 1);
+  const Handle broad = handle(KBVH_DOUBLE);
+  ASSERT_EQ(build(broad, mesh, 0.1), 0);
+  const std::uint32_t* pairs = nullptr;
+  std::size_t count = 0;
+  const auto wrong = [&](const auto& admitted) {
+    Pairs expected = brute_force(mesh, CandidateKind::edge_edge, 0.1);
+    std::erase_if(expected, [&](const Candidate& pair) { return !admitted(pair); });
+    EXPECT_EQ(kbvh_broad_phase_candidates(broad.get(), KBVH_EDGE_EDGE, &pairs, &count), 0);
+    return difference(list_of(pairs, count), expected, mesh.elements(), CandidateKind::edge_edge);
+  };
+  // Even edges pair with odd ones only.
+  std::vector<kbvh_group_mask> groups;
+  for (std::size_t e = 0; e < mesh.edges.size() / 2; ++e)
+    groups.push_back(e % 2 == 0 ? kbvh_group_mask{1, 2} : kbvh_group_mask{2, 1});
+  ASSERT_EQ(kbvh_broad_phase_set_groups(broad.get(), KBVH_EDGE, groups.data(), groups.size()), 0);
+  EXPECT_EQ(wrong([](const Candidate& pair) { return (pair.first + pair.second) % 2 == 1; }), "");
+  const std::uint32_t excluded[] = {pairs[0], pairs[1], pairs[3], pairs[2]};
+  const Candidate two[] = {{pairs[0], pairs[1]}, {pairs[2], pairs[3]}};
+  ASSERT_EQ(kbvh_broad_phase_exclude(broad.get(), KBVH_EDGE_EDGE, excluded, 2), 0);
+  EXPECT_EQ(wrong([&](const Candidate& pair) {
+              return (pair.first + pair.second) % 2 == 1 && pair != two[0] && pair != two[1];
+            }),
+            "");
+  ASSERT_EQ(kbvh_broad_phase_clear_filters(broad.get()), 0);
+  std::uint32_t below = 100;
+  const auto filter = [](void* context, kbvh_candidate_kind, std::uint32_t* list, std::size_t all) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < all; ++i) {
+      if (list[2 * i] >= *static_cast<std::uint32_t*>(context)) continue;
+      list[2 * kept] = list[2 * i];
+      list[2 * kept++ + 1] = list[2 * i + 1];
+    }
+    return kept;
+  };
+  ASSERT_EQ(kbvh_broad_phase_keep_only(broad.get(), filter, &below), 0);
+  EXPECT_EQ(wrong([&](const Candidate& pair) { return pair.first < below; }), "");
+  ASSERT_EQ(kbvh_broad_phase_keep_only(broad.get(), nullptr, nullptr), 0);
+  const std::vector<kbvh_group_mask> apart(mesh.vertex_count(), kbvh_group_mask{1, 2});
+  ASSERT_EQ(kbvh_broad_phase_set_vertex_groups(broad.get(), apart.data(), apart.size()), 0);
+  EXPECT_EQ(wrong([](const Candidate&) { return false; }), "");
+  ASSERT_EQ(kbvh_broad_phase_set_vertex_groups(broad.get(), nullptr, 0), 0);
+  EXPECT_EQ(wrong([](const Candidate&) { return true; }), "");
+  // Edges go, and changes say so; others come.
+  const std::uint32_t *begun = nullptr, *ended = nullptr;
+  std::size_t begun_count = 0, ended_count = 0;
+  const auto changes = [&] {
+    return kbvh_broad_phase_changes(broad.get(), KBVH_EDGE_EDGE, &begun, &begun_count, &ended, &ended_count);
+  };
+  ASSERT_EQ(changes(), 0);
+  EXPECT_EQ(begun_count, brute_force(mesh, CandidateKind::edge_edge, 0.1).size());
+  const std::uint32_t removed[] = {begun[0]};
+  const auto of_removed = [&](const Candidate& pair) {
+    return pair.first == removed[0] || pair.second == removed[0];
+  };
+  ASSERT_EQ(kbvh_broad_phase_remove(broad.get(), KBVH_EDGE, removed, 1), 0);
+  EXPECT_EQ(wrong([&](const Candidate& pair) { return !of_removed(pair); }), "");
+  ASSERT_EQ(changes(), 0);
+  EXPECT_EQ(begun_count, 0u);
+  EXPECT_GT(ended_count, 0u);
+  for (const Candidate& pair : list_of(ended, ended_count)) EXPECT_TRUE(of_removed(pair));
+  const double more[] = {1, 2, 3};
+  const kbvh_positions v{more, 1, 3, 1};
+  const std::int32_t edge[] = {144, 0};
+  std::uint32_t first[3] = {};
+  ASSERT_EQ(kbvh_broad_phase_insert(broad.get(), &v, edge, 1, nullptr, 0, first), 0);
+  EXPECT_EQ(first[0], 144u);
+  EXPECT_EQ(first[1], mesh.edges.size() / 2);
+  EXPECT_EQ(first[2], mesh.faces.size() / 3);
+  ASSERT_EQ(kbvh_broad_phase_insert(broad.get(), nullptr, edge, 1, nullptr, 0, first), 0);
+  EXPECT_EQ(first[1], mesh.edges.size() / 2 + 1);
+  ASSERT_EQ(kbvh_broad_phase_changes_within(broad.get(), KBVH_EDGE_EDGE, 0.1, &begun, &begun_count, &ended,
+                                            &ended_count),
+            0);
+  EXPECT_GT(begun_count, 0u);
+}
+
+TEST(BroadPhaseInC, ErrorsOfFiltersAndEditsAreTexts) {
+  const Mesh<double> mesh = crumpled<double>(6, 1);
+  const Handle broad = handle(KBVH_DOUBLE);
+  ASSERT_EQ(build(broad, mesh, 0.1), 0);
+  const auto error = [&](int status) {
+    EXPECT_EQ(status, -1);
+    return std::string(kbvh_broad_phase_error(broad.get()));
+  };
+  const std::uint32_t ids[] = {99, 0};
+  EXPECT_EQ(error(kbvh_broad_phase_remove(broad.get(), kbvh_element(3), ids, 1)),
+            "an element is 0 to 2, not 3");
+  EXPECT_EQ(error(kbvh_broad_phase_remove(broad.get(), KBVH_VERTEX, ids, 1)), "vertex 99 does not exist");
+  EXPECT_EQ(error(kbvh_broad_phase_set_groups(broad.get(), KBVH_FACE, nullptr, 3)),
+            "groups is a null pointer");
+  EXPECT_EQ(error(kbvh_broad_phase_exclude(broad.get(), KBVH_VERTEX_VERTEX, ids, 1)),
+            "the excluded vertex_vertex pair (99, 0) is not one of 36 vertices and 36 vertices");
+  const auto failing = [](void*, kbvh_candidate_kind, std::uint32_t*, std::size_t) {
+    return ~std::size_t(0);
+  };
+  ASSERT_EQ(kbvh_broad_phase_keep_only(broad.get(), failing, nullptr), 0);
+  const std::uint32_t* pairs = nullptr;
+  std::size_t count = 0;
+  EXPECT_NE(error(kbvh_broad_phase_candidates(broad.get(), KBVH_EDGE_EDGE, &pairs, &count)).find("kept"),
+            std::string::npos);
+  kbvh_impact impact{};
+  EXPECT_NE(error(kbvh_broad_phase_earliest_impact(broad.get(), 0, &impact)).find("motion"),
+            std::string::npos);
+}
+
+TEST(BroadPhaseInC, EarliestImpacts) {
+  // A vertex that falls from 8 to 0 on a face.
+  const double v0[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0.25, 0.25, 8},
+               v1[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0.25, 0.25, 0};
+  const kbvh_positions begin{v0, 4, 3, 1}, end{v1, 4, 3, 1};
+  const std::int32_t face[] = {0, 1, 2};
+  const Handle broad = handle(KBVH_DOUBLE);
+  ASSERT_EQ(kbvh_broad_phase_build(broad.get(), &begin, &end, nullptr, 0, face, 1, 2), 0);
+  kbvh_impact impact{};
+  for (const double separation : {0.0, 1.0, 2.0}) {
+    ASSERT_EQ(kbvh_broad_phase_earliest_impact(broad.get(), separation, &impact), 0);
+    EXPECT_EQ(impact.touches, 1);
+    EXPECT_EQ(impact.kind, KBVH_FACE_VERTEX);
+    EXPECT_EQ(impact.pair[0], 0u);
+    EXPECT_EQ(impact.pair[1], 3u);
+    EXPECT_LE(impact.begin, 1 - separation / 8);
+    EXPECT_GE(impact.end, 1 - separation / 8);
+  }
+  EXPECT_EQ(kbvh_broad_phase_earliest_impact(broad.get(), 2.5, &impact), -1);
+}
+
 }  // namespace
 }  // namespace kbvh::test::broad_phase

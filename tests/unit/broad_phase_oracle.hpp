@@ -5,6 +5,7 @@
 #include <array>
 #include <boost/multiprecision/cpp_int.hpp>
 #include <cmath>
+#include <exception>
 #include <limits>
 #include <set>
 #include <string>
@@ -76,19 +77,19 @@ std::vector<Box<S>> vertex_boxes(const Mesh<S>& mesh, S radius) {
   return boxes;
 }
 
-/// Calls take(candidate) for every pair of elements without a common vertex.
+/// Calls take(candidate) for every pair of living elements without a common vertex.
 template <class Take>
 void for_all_pairs(const Elements& elements, CandidateKind kind, const Take& take) {
   const Element first = first_element(kind), second = second_element(kind);
   for (std::uint32_t a = 0; a < elements.count(first); ++a)
     for (std::uint32_t b = first == second ? a + 1 : 0; b < elements.count(second); ++b)
-      if (!elements.incident(kind, {a, b})) take(Candidate{a, b});
+      if (elements.of(first).alive(a) && elements.of(second).alive(b) && !elements.incident(kind, {a, b}))
+        take(Candidate{a, b});
 }
 
 /// Finds candidates, given the boxes of vertices.
 template <class S>
-Pairs brute_force(const Mesh<S>& mesh, CandidateKind kind, const std::vector<Box<S>>& boxes) {
-  const Elements elements = mesh.elements();
+Pairs brute_force(const Elements& elements, CandidateKind kind, const std::vector<Box<S>>& boxes) {
   std::array<std::vector<Box<S>>, element_kinds> all;
   for (std::size_t element = 0; element < element_kinds; ++element)
     for (std::uint32_t id = 0; id < elements.lists[element].count(); ++id) {
@@ -103,6 +104,11 @@ Pairs brute_force(const Mesh<S>& mesh, CandidateKind kind, const std::vector<Box
       found.insert(pair);
   });
   return found;
+}
+
+template <class S>
+Pairs brute_force(const Mesh<S>& mesh, CandidateKind kind, const std::vector<Box<S>>& boxes) {
+  return brute_force(mesh.elements(), kind, boxes);
 }
 
 template <class S>
@@ -271,6 +277,17 @@ inline std::string difference(std::span<const Candidate> found, const Pairs& exp
   }
   for (const Candidate& pair : expected)
     if (!seen.contains(pair)) return text("is missed", pair);
+  return {};
+}
+
+/// Returns the message of the exception that a call throws; nothing if it throws none.
+template <class Call>
+std::string complaint(const Call& call) {
+  try {
+    call();
+  } catch (const std::exception& error) {
+    return error.what();
+  }
   return {};
 }
 

@@ -288,7 +288,7 @@ TYPED_TEST(BroadPhases, TheEarliestImpactIsThatOfAllPairs) {
         if (impact.touches) end = std::min(end, impact.end);
       });
     EarliestImpactStats stats;
-    const EarliestImpact found = broad.earliest_impact(&stats);
+    const EarliestImpact found = broad.earliest_impact(0, &stats);
     ASSERT_EQ(found.touches, end <= 1) << seed;
     if (found.touches) {
       ++touching;
@@ -301,6 +301,51 @@ TYPED_TEST(BroadPhases, TheEarliestImpactIsThatOfAllPairs) {
   BroadPhase<S> broad;
   crumpled<S>(4, 1).build(broad, S(0));
   EXPECT_THROW(broad.earliest_impact(), std::logic_error);
+}
+
+TYPED_TEST(BroadPhases, TheEarliestApproachIsThatOfAllPairs) {
+  using S = TypeParam;
+  int near = 0, later = 0;
+  for (std::uint64_t seed = 0; seed < 250; ++seed) {
+    const Mesh<S> mesh = random_mesh<S>(seed);
+    const S radius = random_radius<S>(seed);
+    if (!mesh.swept() || radius == 0) continue;
+    BroadPhase<S> broad;
+    mesh.build(broad, radius);
+    const double separation = double(radius) / (1 + double(seed % 2));
+    const Elements elements = mesh.elements();
+    // By definition: of all pairs, in the order of elements.
+    EarliestImpact expected;
+    std::vector<S> begin, end;
+    for (std::size_t v = 0; v < mesh.vertex_count(); ++v)
+      for (std::size_t k = 0; k < 4; ++k) {
+        begin.push_back(k < 3 ? mesh.v0[3 * v + k] : S(0));
+        end.push_back(k < 3 ? mesh.v1[3 * v + k] : S(0));
+      }
+    for (const CandidateKind kind : {CandidateKind::face_vertex, CandidateKind::edge_edge}) {
+      std::vector<Candidate> all;
+      for_all_pairs(elements, kind, [&](const Candidate& pair) { all.push_back(pair); });
+      take_earlier_impacts<S>(kind, elements, begin.data(), end.data(), all, separation, expected);
+    }
+    const EarliestImpact found = broad.earliest_impact(separation);
+    ASSERT_EQ(found.touches, expected.touches) << seed;
+    if (!found.touches) continue;
+    EXPECT_EQ(found.end, expected.end) << seed;
+    EXPECT_EQ(found.pair, expected.pair) << seed;
+    ++near;
+    later += found.begin > 0 ? 1 : 0;
+    const EarliestImpact contact = broad.earliest_impact();
+    EXPECT_TRUE(!contact.touches || contact.end >= found.begin) << seed;
+  }
+  EXPECT_GT(near, 30);
+  EXPECT_GT(later, 3);
+  BroadPhase<S> broad;
+  Mesh<S> mesh = crumpled<S>(4, 1);
+  mesh.v1 = mesh.v0;
+  mesh.build(broad, S(0.5));
+  EXPECT_NE(complaint([&] { broad.earliest_impact(0.75); }).find("from 0 to the radius 0.5"),
+            std::string::npos);
+  EXPECT_NE(complaint([&] { broad.earliest_impact(-1); }), "");
 }
 
 // ---- Seeded faults: what these tests compare with finds them ----------------------------------------------
@@ -356,16 +401,6 @@ TYPED_TEST(BroadPhases, IncidentElementsAreCaught) {
 }
 
 // ---- Input ------------------------------------------------------------------------------------------------
-
-template <class Call>
-std::string complaint(const Call& call) {
-  try {
-    call();
-  } catch (const std::exception& error) {
-    return error.what();
-  }
-  return {};
-}
 
 TYPED_TEST(BroadPhases, WrongInputIsNamedAndChangesNothing) {
   using S = TypeParam;

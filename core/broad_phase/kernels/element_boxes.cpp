@@ -163,25 +163,21 @@ template <class S>
 
 template <class S, std::uint32_t each>
 [[gnu::always_inline]] inline void boxes_of(const ElementBoxesJob<S>& job) {
-  if (job.centres == nullptr) {
-    for (std::uint32_t e = 0; e < job.count; ++e)
-      store(box_of<S, each>(job, e), job.boxes + std::size_t(8) * e);
-    return;
-  }
   Corner<S> smallest, largest;
-  for (std::uint32_t e = 0; e < job.count; ++e) {
+  for (std::uint32_t k = 0; k < job.count; ++k) {
+    const std::uint32_t e = job.living == nullptr ? k : job.living[k];
     const Box8<S> box = box_of<S, each>(job, e);
     store(box, job.boxes + std::size_t(8) * e);
     const Corner<S> centre = sum(box.lower, box.upper);
-    smallest = e == 0 ? centre : smaller(smallest, centre);
-    largest = e == 0 ? centre : larger(largest, centre);
+    smallest = k == 0 ? centre : smaller(smallest, centre);
+    largest = k == 0 ? centre : larger(largest, centre);
     S at[4];
     centre.store(at);
-    for (std::size_t axis = 0; axis < 3; ++axis) job.centres[axis * job.stride + e] = at[axis];
+    for (std::size_t axis = 0; axis < 3; ++axis) job.centres[axis * job.stride + k] = at[axis];
   }
   for (std::size_t axis = 0; axis < 3; ++axis)  // readers take whole registers
-    for (std::size_t e = job.count; e < job.stride; ++e)
-      job.centres[axis * job.stride + e] = job.centres[axis * job.stride + job.count - 1];
+    for (std::size_t k = job.count; k < job.stride; ++k)
+      job.centres[axis * job.stride + k] = job.centres[axis * job.stride + job.count - 1];
   smallest.store(job.extent);
   largest.store(job.extent + 4);
 }
@@ -197,16 +193,57 @@ void elements(const ElementBoxesJob<S>& shared) {
     boxes_of<S, 3>(job);
 }
 
-template <class S>
-void listed(const ElementBoxesJob<S>& shared, const std::uint32_t* ids, std::uint32_t count) {
-  const ElementBoxesJob<S> job = shared;
-  for (std::uint32_t k = 0; k < count; ++k) {
-    const std::uint32_t e = ids[k];
-    const Box8<S> box = job.corners_each == 1   ? box_of<S, 1>(job, e)
-                        : job.corners_each == 2 ? box_of<S, 2>(job, e)
-                                                : box_of<S, 3>(job, e);
-    store(box, job.boxes + std::size_t(8) * e);
+template <class S, std::uint32_t each, std::uint32_t padded>
+[[gnu::always_inline]] inline void leaves_of(const ElementLeafBoxesJob<S>& job) {
+  using P = Points<S, 1>;
+  using Pack = typename P::Pack;
+  for (std::uint32_t leaf = job.begin; leaf < job.end; ++leaf) {
+    const std::uint32_t count = job.end_entry[leaf] - job.first_entry[leaf];
+    const std::uint32_t* const corners = job.corners + std::size_t(leaf) * each * padded;
+    S* const rows = job.rows + std::size_t(leaf) * 6 * padded;
+    Pack smallest, largest;
+    for (std::uint32_t quad = 0; quad < padded; quad += 4) {
+      if (quad != 0 && quad >= count) break;
+      Pack lower[4], upper[4];
+      for (std::uint32_t j = 0; j < 4; ++j) {
+        const S* const first = job.vertex_boxes + std::size_t(8) * corners[quad + j];
+        lower[j] = P::load(first, first);
+        upper[j] = P::load(first + 4, first + 4);
+        for (std::uint32_t c = 1; c < each; ++c) {
+          const S* const next = job.vertex_boxes + std::size_t(8) * corners[c * padded + quad + j];
+          lower[j] = smaller(P::load(next, next), lower[j]);
+          upper[j] = larger(P::load(next + 4, next + 4), upper[j]);
+        }
+        smallest = quad + j == 0 ? lower[j] : smaller(smallest, lower[j]);
+        largest = quad + j == 0 ? upper[j] : larger(largest, upper[j]);
+      }
+      P::template store_rows<false>(lower, rows + quad, padded, 4);
+      P::template store_rows<true>(upper, rows + 3 * padded + quad, padded, 4);
+    }
+    for (std::size_t row = 0; row < 6; ++row)
+      for (std::size_t i = count; i < padded; ++i) rows[row * padded + i] = infinity<S>;
+    P::store_smallest(job.leaf_boxes + std::size_t(8) * leaf, smallest);
+    P::store_largest(job.leaf_boxes + std::size_t(8) * leaf + 4, largest);
   }
+}
+
+template <class S, std::uint32_t padded>
+[[gnu::always_inline]] inline void leaves_padded(const ElementLeafBoxesJob<S>& job) {
+  if (job.corners_each == 1)
+    leaves_of<S, 1, padded>(job);
+  else if (job.corners_each == 2)
+    leaves_of<S, 2, padded>(job);
+  else
+    leaves_of<S, 3, padded>(job);
+}
+
+template <class S>
+void leaves(const ElementLeafBoxesJob<S>& shared) {
+  const ElementLeafBoxesJob<S> job = shared;
+  if (job.padded == 8)
+    leaves_padded<S, 8>(job);
+  else
+    leaves_padded<S, 16>(job);
 }
 
 template <class S>
@@ -246,7 +283,7 @@ void nodes(DirtyNodesJob<S>& shared) {
 }
 
 template <class S>
-constexpr ElementBoxKernels<S> table{&vertices<S>, &elements<S>, &listed<S>, &nodes<S>};
+constexpr ElementBoxKernels<S> table{&vertices<S>, &elements<S>, &leaves<S>, &nodes<S>};
 
 }  // namespace
 

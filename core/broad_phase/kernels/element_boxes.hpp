@@ -32,17 +32,31 @@ struct VertexBoxesJob {
   S room;       ///< smallest distance of a side from its allowed one, inwards; rounded to nearest
 };
 
-/// The boxes of elements of one number of corners, each around those of its vertices.
+/// The boxes of elements of one number of corners, each around those of its vertices, for a build.
 template <class S>
 struct ElementBoxesJob {
   const S* vertex_boxes;         ///< [vertex][8]
   const std::uint32_t* corners;  ///< [element][corners_each]
   std::uint32_t corners_each;    ///< 1, 2 or 3
-  std::uint32_t count;
-  S* boxes;            ///< [element][8]
-  S* centres;          ///< [axis][stride]: lower + upper of each element; null: not asked for
-  std::size_t stride;  ///< a multiple of 4, at least `count`
-  S* extent;           ///< [8]: the smallest centre x, y, z, unused, and the largest
+  const std::uint32_t* living;   ///< [k]: the k-th element of the job; null: k
+  std::uint32_t count;           ///< not 0
+  S* boxes;                      ///< [element][8]
+  S* centres;                    ///< [axis][stride]: lower + upper of the k-th element
+  std::size_t stride;            ///< a multiple of 4, at least `count`
+  S* extent;                     ///< [8]: the smallest centre x, y, z, unused, and the largest
+};
+
+/// The boxes of leaves and of the elements in them, for a refit.
+template <class S>
+struct ElementLeafBoxesJob {
+  const S* vertex_boxes;         ///< [vertex][8]
+  const std::uint32_t* corners;  ///< [leaf][corners_each][padded]; lanes without an element repeat one
+  std::uint32_t corners_each;    ///< 1, 2 or 3
+  std::uint32_t padded;          ///< 8 or 16
+  const std::uint32_t *first_entry, *end_entry;  ///< [leaf]
+  std::uint32_t begin, end;                      ///< the leaves
+  S* rows;                                       ///< [leaf][6][padded]: lower x, y, z, -upper x, y, z
+  S* leaf_boxes;                                 ///< [leaf][8]
 };
 
 /// The nodes of an 8-wide tree above leaves whose boxes changed. Parents have smaller numbers than children.
@@ -60,8 +74,7 @@ template <class S>
 struct ElementBoxKernels {
   void (*vertices)(VertexBoxesJob<S>& job);
   void (*elements)(const ElementBoxesJob<S>& job);
-  /// Computes the boxes of the elements ids[0, count) only.
-  void (*listed)(const ElementBoxesJob<S>& job, const std::uint32_t* ids, std::uint32_t count);
+  void (*leaves)(const ElementLeafBoxesJob<S>& job);
   /// Computes the children's boxes of marked nodes, and of each parent whose child's box changed.
   void (*nodes)(DirtyNodesJob<S>& job);
 };
