@@ -23,11 +23,11 @@ class MovingElements {
       : points_(points), face_(kind == Contact::Kind::vertex_face), largest_step_(largest_step()) {}
 
   bool near_at(double t, double distance) {
-    Comparison<Bounded> filtered(distance);
+    DistanceComparison<BoundedDouble> filtered(distance);
     const bool near = compare(filtered, t);
     if (!filtered.undecided()) return near;
     exact_ = true;
-    Comparison<Dyadic> exact(distance);
+    DistanceComparison<Dyadic> exact(distance);
     return compare(exact, t);
   }
   /// Returns whether the elements are farther apart than the distance from t - half to t + half; false where
@@ -42,8 +42,8 @@ class MovingElements {
 
  private:
   template <class T>
-  bool compare(Comparison<T>& comparison, double t) const {
-    typename Comparison<T>::Point p[4];
+  bool compare(DistanceComparison<T>& comparison, double t) const {
+    typename DistanceComparison<T>::Point p[4];
     for (int i = 0; i < 4; ++i)
       for (int k = 0; k < 3; ++k) p[i].v[k] = T(1 - t) * T(points_.begin[i][k]) + T(t) * T(points_.end[i][k]);
     return face_ ? comparison.point_triangle(p[0], p[1], p[2], p[3])

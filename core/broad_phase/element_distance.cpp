@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "core/scene/distance_comparison.hpp"
 #include "core/geometry/triangle_triangle.hpp"
+#include "core/scene/distance_comparison.hpp"
 
 namespace kbvh {
 namespace {
@@ -15,10 +15,11 @@ bool touch(CandidateKind kind, const double* const* a, const double* const* b) {
 }
 
 template <class T>
-bool compare(CandidateKind kind, const double* const* a, const double* const* b, Comparison<T>& distance) {
-  using Point = typename Comparison<T>::Point;
+bool compare(CandidateKind kind, const double* const* a, const double* const* b,
+             DistanceComparison<T>& distance) {
+  using Point = typename DistanceComparison<T>::Point;
   const auto corners = [](const double* const* from, std::size_t count, Point(&to)[3]) {
-    for (std::size_t i = 0; i < count; ++i) to[i] = Comparison<T>::point(from[i]);
+    for (std::size_t i = 0; i < count; ++i) to[i] = DistanceComparison<T>::point(from[i]);
   };
   const auto count = [](Element element) {
     return element == Element::vertex ? std::size_t(1) : element == Element::edge ? 2 : 3;
@@ -82,7 +83,7 @@ bool boxes_apart(const double* const* a, std::size_t count_a, const double* cons
 bool is_within_exact(CandidateKind kind, const double* const* a, const double* const* b, double distance) {
   if ((kind == CandidateKind::edge_face || kind == CandidateKind::face_face) && touch(kind, a, b))
     return true;
-  Comparison<Dyadic> exact(distance);
+  DistanceComparison<Dyadic> exact(distance);
   return compare(kind, a, b, exact);
 }
 
@@ -93,7 +94,7 @@ bool is_within(CandidateKind kind, const double* const* a, const double* const* 
     if (stats != nullptr) ++stats->apart;
     return false;
   }
-  Comparison<Bounded> filtered(distance);
+  DistanceComparison<BoundedDouble> filtered(distance);
   const bool near = compare(kind, a, b, filtered);
   if (!filtered.undecided()) {
     if (stats != nullptr) ++stats->filtered;

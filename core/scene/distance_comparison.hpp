@@ -8,17 +8,19 @@ namespace kbvh {
 
 /// A double with a bound on its distance from the real number that it stands for. Sums and products take a
 /// few operations; the bound covers its own rounding, too.
-class Bounded {
+class BoundedDouble {
  public:
-  Bounded() = default;
-  Bounded(double value) : value_(value) {}  // NOLINT(google-explicit-constructor): formulas read better
+  BoundedDouble() = default;
+  BoundedDouble(double value) : value_(value) {}  // NOLINT(google-explicit-constructor): formulas read better
 
-  friend Bounded operator+(const Bounded& a, const Bounded& b) {
+  friend BoundedDouble operator+(const BoundedDouble& a, const BoundedDouble& b) {
     const double sum = a.value_ + b.value_;
     return {sum, (a.error_ + b.error_ + std::fabs(sum) * unit) * slack + tiny};
   }
-  friend Bounded operator-(const Bounded& a, const Bounded& b) { return a + Bounded(-b.value_, b.error_); }
-  friend Bounded operator*(const Bounded& a, const Bounded& b) {
+  friend BoundedDouble operator-(const BoundedDouble& a, const BoundedDouble& b) {
+    return a + BoundedDouble(-b.value_, b.error_);
+  }
+  friend BoundedDouble operator*(const BoundedDouble& a, const BoundedDouble& b) {
     const double product = a.value_ * b.value_;
     const double error = std::fabs(a.value_) * b.error_ + std::fabs(b.value_) * a.error_ +
                          a.error_ * b.error_ + std::fabs(product) * unit;
@@ -33,7 +35,7 @@ class Bounded {
   }
 
  private:
-  Bounded(double value, double error) : value_(value), error_(error) {}
+  BoundedDouble(double value, double error) : value_(value), error_(error) {}
   // Half an ulp of the result; the few roundings within a bound; products that underflow, in the value or in
   // the bound.
   static constexpr double unit = 0x1p-53, slack = 1 + 0x1p-49, tiny = 0x1p-1060;
@@ -43,9 +45,9 @@ class Bounded {
 /// Distances of elements against one distance, in numbers of type T. A sign that T leaves undecided is noted,
 /// and the verdict means nothing then.
 template <class T>
-class Comparison {
+class DistanceComparison {
  public:
-  explicit Comparison(double distance) : squared_(T(distance) * T(distance)) {}
+  explicit DistanceComparison(double distance) : squared_(T(distance) * T(distance)) {}
   bool undecided() const { return undecided_; }
 
   struct Point {
