@@ -132,20 +132,20 @@ class Advice:
     def says(self) -> str:
         """Writes the speed out, as in "1.6 times as fast as the best refit (0.9 to 2.1 in 8 cells)"."""
         missing = f", measured in {self.measured}" if self.measured < self.cells else ""
+        disturbed = " (the machine was disturbed)" if self.disturbed else ""
         if self.baseline and not self.best_in:
             span = text.factor(self.low) + (f" to {text.factor(self.high)}" if self.low < self.high else "")
-            return f"a refit, {span} times as fast as the best one of the {'cell' if self.cells == 1 else 'cells'}{missing}"
+            return f"a refit, {span} times as fast as the best one of the {'cell' if self.cells == 1 else 'cells'}{missing}{disturbed}"
         if self.baseline:
             where = "in the only cell" if self.cells == 1 else f"in {self.best_in} of {text.plural(self.cells, 'cell')}"
             worst = f"; at worst {text.factor(self.low)} times as fast as that one" if self.best_in < self.cells else ""
-            return f"the best refit {where}{worst}{missing}"
+            return f"the best refit {where}{worst}{missing}{disturbed}"
         span = f"{text.factor(self.low)} to {text.factor(self.high)}" if self.low < self.high else ""
         of = f"{span} in {text.plural(self.cells, 'cell')}".lstrip()
         if span and self.cells == 1:
             of = ("95\u00a0% interval " if self.is_interval else "range of its rounds ") + span
         doubt = "; the machine was disturbed" if self.disturbed else ""
         return f"{text.factor(self.speed)} times as fast as the best refit ({of}{missing}{doubt})"
-
 
     @property
     def costs(self) -> str:

@@ -173,7 +173,7 @@ def on_errors(errors: Sequence[time_error_panels.Shown], reference: Path = REFER
     says = "No contestant of this study answers wrongly, so it does not say what exactness costs."
     file = reference / time_error_file.FILE
     kept = time_error_file.read(file) if file.exists() else []
-    return f"{says} Elsewhere: {kept[0].sentences[0]} {kept[0].measured}" if kept else says
+    return f"{says} By measurements that come with the project: {kept[0].sentences[0]} {kept[0].measured}" if kept else says
 
 
 def sentences(study: Study, found: Sequence[Situation], errors: Sequence[time_error_panels.Shown], known: Paper) -> list[Sentence]:

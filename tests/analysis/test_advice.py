@@ -75,6 +75,8 @@ class TestRule(unittest.TestCase):
         best = taken(lines)[0]
         self.assertEqual(best.id, "lazy")
         self.assertEqual(best.says, "the best refit in 1 of 3 cells; at worst 0.91 times as fast as that one")
+        lines[-1]["times"]["disturbed"] = "9 involuntary switches"
+        self.assertTrue(taken(lines)[0].says.endswith("as that one (the machine was disturbed)"))
 
     def test_a_range_of_few_rounds_is_not_called_an_interval(self) -> None:
         for rounds, word in ((5, "95\u00a0% interval"), (3, "range of its rounds")):

@@ -111,9 +111,9 @@ class TestSentences(unittest.TestCase):
             says = summary.on_others(situations, folder)
             self.assertRegex(says, r"not asked for in this study\. By measurements that come with the project \(plan .*\): With 10 frames .* and rays, take refit where")
             self.assertNotIn("come with", summary.on_others(advice.situations([*advice.cells(self.study(kept)), *self.within()]), folder))
-            self.assertNotIn("Elsewhere", summary.on_errors([], folder))
+            self.assertNotIn("come with", summary.on_errors([], folder))
             (folder / "errors.json").write_text(time_error_file.content(time_error.places(self.study([*lines, wrong]))), encoding="utf-8")
-            self.assertRegex(summary.on_errors([], folder), r"Elsewhere: Without knowledge .* Measured .*commit ")
+            self.assertRegex(summary.on_errors([], folder), r"come with the project: Without knowledge .* Measured .*commit ")
 
     def within(self) -> list[advice.MeasuredCell]:
         lines = [line("refit", 2.0, "alone"), other("join", 1.0, "alone", foresight="next_keyframe")]

@@ -90,13 +90,14 @@ function questions({ state, set }, found) {
 /** Tells the speed of a strategy, as analysis/advice/advice.py does. */
 export function speedText(one) {
   const missing = one.own.length < one.cells ? `, measured in ${one.own.length}` : "";
+  const disturbed = one.disturbed ? " (the machine was disturbed)" : "";
   if (one.contestant.baseline && !one.bestIn) {
     const span = one.low < one.high ? `${factor(one.low)} to ${factor(one.high)}` : factor(one.low);
-    return `a refit, ${span} times as fast as the best one of the ${one.cells === 1 ? "cell" : "cells"}${missing}`;
+    return `a refit, ${span} times as fast as the best one of the ${one.cells === 1 ? "cell" : "cells"}${missing}${disturbed}`;
   }
   if (one.contestant.baseline) {
     const where = one.cells === 1 ? "in the only cell" : `in ${one.bestIn} of ${plural(one.cells, "cell")}`;
-    return `the best refit ${where}${one.bestIn < one.cells ? `; at worst ${factor(one.low)} times as fast as that one` : ""}${missing}`;
+    return `the best refit ${where}${one.bestIn < one.cells ? `; at worst ${factor(one.low)} times as fast as that one` : ""}${missing}${disturbed}`;
   }
   const span = one.low < one.high ? `${factor(one.low)} to ${factor(one.high)}` : "";
   const kind = one.isInterval ? "95\u00a0% interval" : "range of its rounds";
