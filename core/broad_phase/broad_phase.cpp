@@ -424,7 +424,7 @@ const CandidateBuffer& BroadPhase<S>::kept(CandidateKind kind) {
 
 template <class S>
 std::span<const Candidate> BroadPhase<S>::candidates(CandidateKind kind) {
-  return kept(kind);
+  return span_of(kept(kind));
 }
 
 template <class S>
@@ -445,7 +445,7 @@ void BroadPhase<S>::within(CandidateKind kind, double distance, CandidateBuffer&
   const CandidateBuffer& found = kept(kind);
   const S* const points = motion_ == Motion::straight ? end_points_.data() : points_.data();
   out.resize(found.size());
-  out.resize(keep_within<S>(kind, *elements_, points, distance, found, out.data()));
+  out.resize(keep_within<S>(kind, *elements_, points, distance, span_of(found), out.data()));
 }
 
 template <class S>
@@ -456,7 +456,7 @@ CandidateChanges BroadPhase<S>::changes(CandidateKind kind) {
 template <class S>
 CandidateChanges BroadPhase<S>::changes_within(CandidateKind kind, double distance) {
   within(kind, distance, near_);
-  return near_changes_[std::size_t(kind)].take(near_, elements_->count(first_element(kind)));
+  return near_changes_[std::size_t(kind)].take(span_of(near_), elements_->count(first_element(kind)));
 }
 
 template <class S>
@@ -469,8 +469,8 @@ EarliestImpact BroadPhase<S>::earliest_impact(double separation, EarliestImpactS
                                 number_text(double(radius_)) + ", not " + number_text(separation));
   EarliestImpact earliest;
   for (const CandidateKind kind : {CandidateKind::face_vertex, CandidateKind::edge_edge})
-    take_earlier_impacts<S>(kind, *elements_, points_.data(), end_points_.data(), kept(kind), separation,
-                            earliest, stats);
+    take_earlier_impacts<S>(kind, *elements_, points_.data(), end_points_.data(), span_of(kept(kind)),
+                            separation, earliest, stats);
   return earliest;
 }
 

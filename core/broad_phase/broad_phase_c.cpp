@@ -154,7 +154,7 @@ int kbvh_broad_phase_within(kbvh_broad_phase* handle, kbvh_candidate_kind kind, 
     check_pointer(pairs, "pairs");
     check_pointer(count, "count");
     broad.within(checked(kind), distance, handle->within);
-    hand_over(handle->within, pairs, count);
+    hand_over(span_of(handle->within), pairs, count);
   });
 }
 

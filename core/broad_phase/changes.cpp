@@ -37,7 +37,7 @@ CandidateChanges ChangeTracker::take(std::span<const Candidate> present, std::ui
   ended_.insert(ended_.end(), before, known_.end());
   begun_.insert(begun_.end(), now, present_.end());
   known_.swap(present_);
-  return {begun_, ended_};
+  return {span_of(begun_), span_of(ended_)};
 }
 
 std::size_t ChangeTracker::bytes() const {

@@ -111,6 +111,10 @@ static_assert(sizeof(Candidate) == 8);
 
 /// The caller's list of candidates. `resize` leaves new entries unset.
 using CandidateBuffer = UnfilledArray<Candidate>;
+/// Returns the list as a span; not every standard library converts lists with an allocator of their own.
+inline std::span<const Candidate> span_of(const CandidateBuffer& list) {
+  return {list.data(), list.size()};
+}
 
 /// Vertices, edges and faces over one set of vertices, as lists of primitives of one, two and three vertices.
 /// Edges and faces are independent: edges need not be those of the faces.
