@@ -29,8 +29,8 @@ FLAGS = ("-std=c++20", "-O2", "-ffp-contract=off", "-fPIC", "-shared")
 
 
 @lru_cache(maxsize=None)
-def library() -> ctypes.CDLL:
-    """Returns the library, with its functions declared. Raises ResultError if it is neither here nor can be compiled."""
+def functions() -> ctypes.CDLL:
+    """Returns the library with its functions, declared. Raises ResultError if it is neither here nor can be compiled."""
     installed = Path(__file__).with_name(NAME)
     found = ctypes.CDLL(str(installed if installed.exists() else compiled(Path(__file__).resolve().parents[2])))
     address, number, text = ctypes.c_void_p, ctypes.c_double, ctypes.c_char_p

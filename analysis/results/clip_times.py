@@ -49,7 +49,7 @@ class RawTimes:
     def handle(self) -> int:
         """The program's object with these times, made once, with the resamples that it has computed."""
         if self._handle is None:
-            library = arithmetic.library()
+            functions = arithmetic.functions()
             of_rounds, frames = self.totals.shape
             begin = -1 if self.steady_from is None else self.steady_from
             tables = [
@@ -57,8 +57,8 @@ class RawTimes:
                 for table, columns in ((self.totals, frames), (self.motions, frames), (self.sums, len(PARTS)), (self.steady_sums, len(PARTS)))
             ]
             pointers = [None if table is None else table.ctypes.data for table in tables]
-            self._handle = library.kbvh_times_new(of_rounds, frames, *pointers, begin, self.by_clips, self.session.encode())
-            weakref.finalize(self, library.kbvh_times_delete, self._handle)
+            self._handle = functions.kbvh_times_new(of_rounds, frames, *pointers, begin, self.by_clips, self.session.encode())
+            weakref.finalize(self, functions.kbvh_times_delete, self._handle)
         return self._handle
 
 
@@ -81,17 +81,17 @@ def time_of(times: RawTimes, phase: str, by_clips: Optional[bool] = None, steady
     (phases are scaled to that total), by clips the median of the repetitions' sums. NaN for steady times where there are none.
     """
     by_clips = times.by_clips if by_clips is None else by_clips
-    return float(arithmetic.library().kbvh_times_of(times.handle, phase.encode(), steady, by_clips))
+    return float(arithmetic.functions().kbvh_times_of(times.handle, phase.encode(), steady, by_clips))
 
 
 def replicates(times: RawTimes, phase: str) -> np.ndarray:
     """Returns the time over each resample of the rounds, by frames."""
-    return _several(arithmetic.library().kbvh_times_replicates, times, phase, DRAWS)
+    return _several(arithmetic.functions().kbvh_times_replicates, times, phase, DRAWS)
 
 
 def single_times(times: RawTimes, phase: str) -> np.ndarray:
     """Returns the time of each repetition alone."""
-    return _several(arithmetic.library().kbvh_times_single, times, phase, times.repetitions)
+    return _several(arithmetic.functions().kbvh_times_single, times, phase, times.repetitions)
 
 
 @dataclass(frozen=True)
@@ -110,11 +110,11 @@ class Ratio:
 def ratio_of(numerator: RawTimes, denominator: RawTimes, phase: str, steady: bool = False) -> Optional[Ratio]:
     """Returns the ratio of two times; None if one of them is 0 or unknown. If one counts by clips, both do."""
     found = (ctypes.c_double * 3)()
-    facts = arithmetic.library().kbvh_times_ratio(numerator.handle, denominator.handle, phase.encode(), steady, found)
+    facts = arithmetic.functions().kbvh_times_ratio(numerator.handle, denominator.handle, phase.encode(), steady, found)
     return Ratio(*found, bool(facts & 2), bool(facts & 4)) if facts else None
 
 
 def paid_from(own: RawTimes, own_preparation: float, other: RawTimes, other_preparation: float) -> Optional[int]:
     """Returns the frame from which on preparation (ms) and frames so far take no longer than the other's; None if never."""
-    frame = arithmetic.library().kbvh_times_paid_from(own.handle, own_preparation, other.handle, other_preparation)
+    frame = arithmetic.functions().kbvh_times_paid_from(own.handle, own_preparation, other.handle, other_preparation)
     return None if frame < 0 else int(frame)

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/broad_phase/approach.hpp"
-#include "core/motion/algebraic_time.hpp"
+#include "core/motion/moving_vector.hpp"
 
 namespace kbvh {
 namespace {
@@ -13,23 +13,7 @@ namespace {
 using Integer = Dyadic::Integer;
 using Time = BasicAlgebraicTime<LongPolynomial>;
 
-struct MovingVector {
-  LongPolynomial axis[3];
-};
-MovingVector operator-(const MovingVector& a, const MovingVector& b) {
-  return {{a.axis[0] - b.axis[0], a.axis[1] - b.axis[1], a.axis[2] - b.axis[2]}};
-}
-MovingVector cross(const MovingVector& a, const MovingVector& b) {
-  MovingVector result;
-  for (int k = 0; k < 3; ++k) {
-    const int u = (k + 1) % 3, v = (k + 2) % 3;
-    result.axis[k] = a.axis[u] * b.axis[v] - a.axis[v] * b.axis[u];
-  }
-  return result;
-}
-LongPolynomial dot(const MovingVector& a, const MovingVector& b) {
-  return a.axis[0] * b.axis[0] + a.axis[1] * b.axis[1] + a.axis[2] * b.axis[2];
-}
+using Vector = MovingVector<LongPolynomial>;
 
 /// Two points, a point and a line, a point and a plane, or two lines, and where their nearest points are.
 /// They are near at t if `size` is positive there, all of `inside` are at least 0 and `beyond` is at most 0.
@@ -115,22 +99,22 @@ class Approach {
   }
 
   void add_points(int i, int j) {
-    const MovingVector between = p_[i] - p_[j];
+    const Vector between = p_[i] - p_[j];
     features_.push_back({{}, {}, dot(between, between) - squared_});
   }
   void add_point_line(int i, int a, int b) {
-    const MovingVector along = p_[b] - p_[a], from = p_[i] - p_[a];
+    const Vector along = p_[b] - p_[a], from = p_[i] - p_[a];
     const LongPolynomial at = dot(from, along), length = dot(along, along);
     add(length, {at, length - at}, dot(from, from) * length - at * at);
   }
   void add_point_plane() {
-    const MovingVector a = p_[2] - p_[1], b = p_[3] - p_[1], from = p_[0] - p_[1], normal = cross(a, b);
+    const Vector a = p_[2] - p_[1], b = p_[3] - p_[1], from = p_[0] - p_[1], normal = cross(a, b);
     const LongPolynomial size = dot(normal, normal), height = dot(from, normal);
     const LongPolynomial second = dot(cross(a, from), normal), first = dot(cross(from, b), normal);
     add(size, {second, first, size - first - second}, height * height);
   }
   void add_lines() {
-    const MovingVector u = p_[1] - p_[0], v = p_[3] - p_[2], from = p_[2] - p_[0], normal = cross(u, v);
+    const Vector u = p_[1] - p_[0], v = p_[3] - p_[2], from = p_[2] - p_[0], normal = cross(u, v);
     const LongPolynomial size = dot(normal, normal), height = dot(from, normal);
     const LongPolynomial on_first = dot(cross(from, v), normal), on_second = dot(cross(from, u), normal);
     add(size, {on_first, size - on_first, on_second, size - on_second}, height * height);
@@ -152,7 +136,7 @@ class Approach {
     });
   }
 
-  MovingVector p_[4];
+  Vector p_[4];
   LongPolynomial squared_;
   std::vector<Feature> features_;
 };

@@ -4,35 +4,17 @@
 #include <vector>
 
 #include "core/continuous/impact.hpp"
-#include "core/motion/algebraic_time.hpp"
+#include "core/motion/moving_vector.hpp"
 
 namespace kbvh {
 namespace {
 
 using Integer = Polynomial::Integer;
 
-/// A vector that moves linearly, or the cross product of two: one polynomial per axis.
-struct MovingVector {
-  Polynomial axis[3];
-};
-
-MovingVector operator-(const MovingVector& a, const MovingVector& b) {
-  return {{a.axis[0] - b.axis[0], a.axis[1] - b.axis[1], a.axis[2] - b.axis[2]}};
-}
-MovingVector cross(const MovingVector& a, const MovingVector& b) {
-  MovingVector result;
-  for (int k = 0; k < 3; ++k) {
-    const int u = (k + 1) % 3, v = (k + 2) % 3;
-    result.axis[k] = a.axis[u] * b.axis[v] - a.axis[v] * b.axis[u];
-  }
-  return result;
-}
-Polynomial dot(const MovingVector& a, const MovingVector& b) {
-  return a.axis[0] * b.axis[0] + a.axis[1] * b.axis[1] + a.axis[2] * b.axis[2];
-}
+using Vector = MovingVector<Polynomial>;
 
 /// Converts all 24 coordinates to integers times one power of two; a common factor changes no verdict.
-void scale(const MovingPoints& points, MovingVector (&moving)[4]) {
+void scale(const MovingPoints& points, Vector (&moving)[4]) {
   Dyadic values[4][3][2];
   int lowest = 0;
   bool first = true;
@@ -65,7 +47,7 @@ class ExactQuery {
  public:
   ExactQuery(Contact::Kind kind, const MovingPoints& points) : kind_(kind) {
     scale(points, p_);
-    MovingVector a, b, r;
+    Vector a, b, r;
     if (kind == Contact::Kind::vertex_face) {
       a = p_[2] - p_[1];
       b = p_[3] - p_[1];
@@ -84,8 +66,8 @@ class ExactQuery {
       append_inner_roots(coplanar_, times_);
       if (times_.empty()) return;
     }
-    const MovingVector x = kind == Contact::Kind::vertex_face ? cross(a, r) : cross(r, a);
-    const MovingVector y = cross(r, b);
+    const Vector x = kind == Contact::Kind::vertex_face ? cross(a, r) : cross(r, a);
+    const Vector y = cross(r, b);
     if (kind == Contact::Kind::vertex_face)
       shares_ = {x, y, normal_ - x - y};
     else
@@ -114,12 +96,12 @@ class ExactQuery {
   /// change only at roots of the polynomials that `touch_at` reads. So if there is any contact, there is one
   /// at such a root or at an end.
   void add_times_in_plane() {
-    const auto add = [&](const MovingVector& vector) {
+    const auto add = [&](const Vector& vector) {
       for (const Polynomial& q : vector.axis)
         if (q.degree() >= 1) append_inner_roots(q, times_);
     };
     add(normal_);
-    for (const MovingVector& share : shares_) add(share);
+    for (const Vector& share : shares_) add(share);
     for (const auto& [i, j] : differences()) add(p_[i] - p_[j]);
   }
 
@@ -137,7 +119,7 @@ class ExactQuery {
       const int side = t.sign(normal_.axis[k]);
       if (side == 0) continue;
       // Projecting along axis k preserves the points' plane.
-      for (const MovingVector& share : shares_)
+      for (const Vector& share : shares_)
         if (t.sign(share.axis[k]) * side < 0) return false;
       return true;
     }
@@ -151,7 +133,7 @@ class ExactQuery {
   }
   /// Returns whether point i is on the segment from j to k. `area` is twice that of the three points, up to
   /// its sign.
-  bool on_segment(const AlgebraicTime& t, int i, int j, int k, const MovingVector& area) const {
+  bool on_segment(const AlgebraicTime& t, int i, int j, int k, const Vector& area) const {
     for (const Polynomial& component : area.axis)
       if (t.sign(component) != 0) return false;
     for (int axis = 0; axis < 3; ++axis)
@@ -161,9 +143,9 @@ class ExactQuery {
   }
 
   Contact::Kind kind_;
-  MovingVector p_[4], normal_;
+  Vector p_[4], normal_;
   Polynomial coplanar_;
-  std::vector<MovingVector> shares_;
+  std::vector<Vector> shares_;
   std::vector<AlgebraicTime> times_;  ///< candidate times of contact
 };
 

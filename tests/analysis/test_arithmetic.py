@@ -74,9 +74,9 @@ class TestInstalled(unittest.TestCase):
         with tempfile.TemporaryDirectory(prefix="kbvh-analysis-") as place:
             shutil.copytree(ROOT / "analysis" / "results", Path(place) / "results")
             made = Path(place) / "results" / arithmetic.NAME
-            shutil.copy(arithmetic.library()._name, made)
+            shutil.copy(arithmetic.functions()._name, made)
             said = subprocess.run(
-                [sys.executable, "-c", "from results import arithmetic, clip_times; print(arithmetic.library()._name, clip_times.DRAWS)"],
+                [sys.executable, "-c", "from results import arithmetic, clip_times; print(arithmetic.functions()._name, clip_times.DRAWS)"],
                 cwd=place, capture_output=True, text=True, check=True,
             ).stdout  # fmt: skip
             self.assertEqual(said.split(), [str(made), "200"])
@@ -95,7 +95,7 @@ class TestTables(unittest.TestCase):
 
     def test_are_freed_with_their_run(self) -> None:
         freed = []
-        with mock.patch.object(arithmetic.library(), "kbvh_times_delete", freed.append):
+        with mock.patch.object(arithmetic.functions(), "kbvh_times_delete", freed.append):
             run = times([[1.0], [2.0]])
             handle = run.handle
             self.assertEqual(run.handle, handle, "made once")

@@ -48,6 +48,26 @@ std::vector<double> some_frames(const TestScene<S>& test) {
   return some;
 }
 
+/// Plays some frames of a clip, with all changes of its script, and calls look(2 * frame) at each of them,
+/// and look(2 * frame + 1) after a change of geometry there.
+template <class S, class Look>
+void play_some_frames(Session<S>& session, const TestScene<S>& test, const Look& look) {
+  const std::vector<double> frames = some_frames(test);
+  ScriptCursor<S> cursor(test.script.steps.empty() ? nullptr : &test.script);
+  PhaseTimes ignored;
+  for (std::size_t f = 0; f < frames.size(); ++f) {
+    if (f == 0)
+      session.reset(frames[0]);
+    else
+      session.advance(frames[f], ignored);
+    look(2 * f);
+    const auto* const step = cursor.at(frames[f]);
+    if (step == nullptr) continue;
+    follow(session, step, ignored);
+    if (!step->geometry.empty()) look(2 * f + 1);
+  }
+}
+
 /// Plays a clip with rays and pairs alternately, and returns the first violation, or an empty text.
 template <class S>
 std::string rays_violation(const StrategyEntry& entry, const TestScene<S>& test, const BuilderConfig& builder,
@@ -55,8 +75,6 @@ std::string rays_violation(const StrategyEntry& entry, const TestScene<S>& test,
                            std::uint64_t& hits) {
   if (!skipped(entry, test).empty() || !unsuitable_bodies(entry.info, test.scene).empty()) return {};
   Session<S> session(test.scene, {&entry, params, builder});
-  const std::vector<double> frames = some_frames(test);
-  ScriptCursor<S> cursor(test.script.steps.empty() ? nullptr : &test.script);
   PhaseTimes ignored;
   PairBuffer pairs;
   std::string violation;
@@ -89,17 +107,7 @@ std::string rays_violation(const StrategyEntry& entry, const TestScene<S>& test,
     if (entry.info.guarantee == Guarantee::exact && pairs != expected.pairs && violation.empty())
       violation = where + "pairs after rays are not the pairs that intersect";
   };
-  for (std::size_t f = 0; f < frames.size(); ++f) {
-    if (f == 0)
-      session.reset(frames[0]);
-    else
-      session.advance(frames[f], ignored);
-    look(2 * f);
-    const auto* const step = cursor.at(frames[f]);
-    if (step == nullptr) continue;
-    follow(session, step, ignored);
-    if (!step->geometry.empty()) look(2 * f + 1);
-  }
+  play_some_frames(session, test, look);
   return violation;
 }
 

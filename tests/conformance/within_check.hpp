@@ -19,8 +19,6 @@ std::string within_violation(const StrategyEntry& entry, const TestScene<S>& tes
                              std::map<std::size_t, WithinTruth<S>>& truth, std::uint64_t& hits) {
   if (!skipped(entry, test).empty() || !unsuitable_bodies(entry.info, test.scene).empty()) return {};
   Session<S> session(test.scene, {&entry, params, builder});
-  const std::vector<double> frames = some_frames(test);
-  ScriptCursor<S> cursor(test.script.steps.empty() ? nullptr : &test.script);
   PhaseTimes ignored;
   PairBuffer pairs;
   std::string violation;
@@ -41,17 +39,7 @@ std::string within_violation(const StrategyEntry& entry, const TestScene<S>& tes
     if (!check.holds() && violation.empty())
       violation = "frame " + std::to_string(frame) + ": " + check.first_violation;
   };
-  for (std::size_t f = 0; f < frames.size(); ++f) {
-    if (f == 0)
-      session.reset(frames[0]);
-    else
-      session.advance(frames[f], ignored);
-    look(2 * f);
-    const auto* const step = cursor.at(frames[f]);
-    if (step == nullptr) continue;
-    follow(session, step, ignored);
-    if (!step->geometry.empty()) look(2 * f + 1);
-  }
+  play_some_frames(session, test, look);
   return violation;
 }
 
