@@ -25,21 +25,19 @@ class Ratio(clip_times.Ratio):
 
 
 def clip_total(study: Study, run: int) -> float:
-    """Returns the time of a run's whole clip, in ms per frame, by which the best refit is chosen: all phases, positions included (some
-    baselines fetch them in their own phases). `shortest_clip` of experiments/results/table.hpp and `clipTotal` of the explorer are the
-    same number; tests compare the choices. NaN without times.
-    """
-    return clip_times.time_of(study.raw[run], SCOPES["with_motion"]) if run in study.raw else math.nan
+    """Returns the time of a run's whole clip (`clip_times.clip_total`); NaN without times."""
+    return clip_times.clip_total(study.raw[run]) if run in study.raw else math.nan
 
 
 def best_refit(study: Study, group: pd.DataFrame) -> Optional[int]:
-    """Returns the run of the verified baseline of a group with the smallest `clip_total`, the first of equal ones; None without one.
+    """Returns the run of a group's best refit (`clip_times.best_refit`), of equal ones the first; None without one.
 
     It is the one denominator of the group: its phases are the denominators of ratios of phases.
     """
-    refits = group[group["baseline"] & (group["guarantee"] != "approximate") & (group["refused"] == "")]
-    totals = {int(run): clip_total(study, int(run)) for run in refits["run"] if int(run) in study.raw}
-    return min(totals, key=lambda run: (totals[run], run)) if totals else None
+    rows = group.sort_values("run")
+    times = [study.raw.get(int(run)) if refused == "" else None for run, refused in zip(rows["run"], rows["refused"])]
+    found = clip_times.best_refit(times, rows["baseline"], rows["guarantee"] == "approximate")
+    return None if found is None else int(rows["run"].iloc[found])
 
 
 def ratio(study: Study, run: int, reference: int, scope: str, steady: bool = False) -> Optional[Ratio]:

@@ -23,7 +23,8 @@ NAME = "libclip_times.so"
 #: Each file of the sources, below the root of the tree.
 SOURCES = (
     "analysis/results/clip_times.cpp", "experiments/study/raw_times.cpp", "experiments/study/raw_times.hpp",
-    "experiments/study/resamples.hpp", "experiments/study/chance.hpp", "core/judge/phase_times.hpp",
+    "experiments/study/best_refit.cpp", "experiments/study/best_refit.hpp", "experiments/study/resamples.hpp",
+    "experiments/study/chance.hpp", "core/judge/phase_times.hpp",
 )  # fmt: skip
 FLAGS = ("-std=c++20", "-O2", "-ffp-contract=off", "-fPIC", "-shared")
 
@@ -41,6 +42,8 @@ def functions() -> ctypes.CDLL:
         ("single", None, (address, text, address)),
         ("replicates", None, (address, text, address)),
         ("ratio", ctypes.c_int, (address, address, text, ctypes.c_int, address)),
+        ("clip_total", number, (address,)),
+        ("best_refit", ctypes.c_int64, (ctypes.c_size_t, address, ctypes.c_char_p, ctypes.c_char_p)),
         ("paid_from", ctypes.c_int64, (address, number, address, number)),
     ):
         function = getattr(found, f"kbvh_times_{name}")

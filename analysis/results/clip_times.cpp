@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "experiments/study/best_refit.hpp"
 #include "experiments/study/resamples.hpp"
 
 namespace {
@@ -96,6 +97,21 @@ int kbvh_times_ratio(Times* numerator, Times* denominator, const char* phase, in
   out[2] = ratio->within ? ratio->within->high : ratio->middle;
   return 1 + (rounds_of(numerator->raw, denominator->raw) == Rounds::same ? 2 : 0) +
          (ratio->within && ratio->within->is_interval ? 4 : 0);
+}
+
+/// Returns the time by which contestants are ranked.
+double kbvh_times_clip_total(const Times* times) {
+  return clip_total(times->raw);
+}
+
+/// Returns the index of the best refit; -1 if there is none. A null pointer is a contestant without times.
+std::int64_t kbvh_times_best_refit(std::size_t count, const Times* const* times,
+                                   const unsigned char* baseline, const unsigned char* approximate) {
+  std::vector<RefitCandidate> table;
+  for (std::size_t i = 0; i < count; ++i)
+    table.push_back({times[i] == nullptr ? nullptr : &times[i]->raw, baseline[i] != 0, approximate[i] != 0});
+  const auto best = best_refit(table);
+  return best ? std::int64_t(*best) : -1;
 }
 
 /// Returns the frame from which on preparation has paid; -1 if there is none.

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import weakref
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Optional
 
@@ -82,6 +83,22 @@ def time_of(times: RawTimes, phase: str, by_clips: Optional[bool] = None, steady
     """
     by_clips = times.by_clips if by_clips is None else by_clips
     return float(arithmetic.functions().kbvh_times_of(times.handle, phase.encode(), steady, by_clips))
+
+
+def clip_total(times: RawTimes) -> float:
+    """Returns the time of the whole clip, in ms per frame, by which the best refit and the best of several configurations are chosen:
+    all phases, positions included (some baselines fetch them in their own phases). The explorer's `clipTotal` is the same number.
+    """
+    return float(arithmetic.functions().kbvh_times_clip_total(times.handle))
+
+
+def best_refit(times: Sequence[Optional[RawTimes]], baseline: Sequence[bool], approximate: Sequence[bool]) -> Optional[int]:
+    """Returns the index of the best refit of a table, by the program's own rule; None if there is none. Times are None where a
+    contestant was refused.
+    """
+    handles = (ctypes.c_void_p * len(times))(*[None if one is None else one.handle for one in times])
+    index = arithmetic.functions().kbvh_times_best_refit(len(times), handles, bytes(map(bool, baseline)), bytes(map(bool, approximate)))
+    return None if index < 0 else int(index)
 
 
 def replicates(times: RawTimes, phase: str) -> np.ndarray:

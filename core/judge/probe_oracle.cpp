@@ -115,9 +115,9 @@ BallHits brute_force_within(const Scene<S>& scene, Playback<S>& playback, std::s
   return found;
 }
 
-RayCheck compare_within(std::size_t balls, const BallHits& found, const BallHits& truth) {
-  RayCheck check;
-  check.rays = balls;
+ProbeCheck compare_within(std::size_t balls, const BallHits& found, const BallHits& truth) {
+  ProbeCheck check;
+  check.probes = balls;
   check.hits = truth.size();
   BallHits missed, extra;
   std::set_difference(truth.begin(), truth.end(), found.begin(), found.end(), std::back_inserter(missed));
@@ -135,8 +135,8 @@ RayCheck compare_within(std::size_t balls, const BallHits& found, const BallHits
   return check;
 }
 
-void RayCheck::add(const RayCheck& other) {
-  rays += other.rays;
+void ProbeCheck::add(const ProbeCheck& other) {
+  probes += other.probes;
   hits += other.hits;
   missed += other.missed;
   extra += other.extra;
@@ -145,19 +145,19 @@ void RayCheck::add(const RayCheck& other) {
 }
 
 template <class S>
-RayCheck check_hits(const Scene<S>& scene, Playback<S>& playback, RayQuery query,
-                    std::span<const Ray<S>> rays, std::span<const RayHit> found) {
+ProbeCheck check_hits(const Scene<S>& scene, Playback<S>& playback, RayQuery query,
+                      std::span<const Ray<S>> rays, std::span<const RayHit> found) {
   std::vector<RayHit> truth(rays.size());
   brute_force_hits(scene, playback, RayQuery::closest, rays, std::span<RayHit>(truth));
   return compare_hits(scene, playback, query, rays, found, std::span<const RayHit>(truth));
 }
 
 template <class S>
-RayCheck compare_hits(const Scene<S>& scene, const Playback<S>& playback, RayQuery query,
-                      std::span<const Ray<S>> rays, std::span<const RayHit> found,
-                      std::span<const RayHit> truth) {
-  RayCheck check;
-  check.rays = rays.size();
+ProbeCheck compare_hits(const Scene<S>& scene, const Playback<S>& playback, RayQuery query,
+                        std::span<const Ray<S>> rays, std::span<const RayHit> found,
+                        std::span<const RayHit> truth) {
+  ProbeCheck check;
+  check.probes = rays.size();
   for (std::size_t i = 0; i < rays.size(); ++i) {
     check.hits += truth[i] ? 1 : 0;
     const bool same = query == RayQuery::closest || !found[i] || !truth[i]
@@ -172,14 +172,14 @@ RayCheck compare_hits(const Scene<S>& scene, const Playback<S>& playback, RayQue
   return check;
 }
 
-#define KBVH_INSTANTIATE(S)                                                                              \
-  template BallHits brute_force_within(const Scene<S>&, Playback<S>&, std::span<const Ball<S>>);         \
-  template void brute_force_hits(const Scene<S>&, Playback<S>&, RayQuery, std::span<const Ray<S>>,       \
-                                 std::span<RayHit>);                                                     \
-  template RayCheck compare_hits(const Scene<S>&, const Playback<S>&, RayQuery, std::span<const Ray<S>>, \
-                                 std::span<const RayHit>, std::span<const RayHit>);                      \
-  template RayCheck check_hits(const Scene<S>&, Playback<S>&, RayQuery, std::span<const Ray<S>>,         \
-                               std::span<const RayHit>);
+#define KBVH_INSTANTIATE(S)                                                                                \
+  template BallHits brute_force_within(const Scene<S>&, Playback<S>&, std::span<const Ball<S>>);           \
+  template void brute_force_hits(const Scene<S>&, Playback<S>&, RayQuery, std::span<const Ray<S>>,         \
+                                 std::span<RayHit>);                                                       \
+  template ProbeCheck compare_hits(const Scene<S>&, const Playback<S>&, RayQuery, std::span<const Ray<S>>, \
+                                   std::span<const RayHit>, std::span<const RayHit>);                      \
+  template ProbeCheck check_hits(const Scene<S>&, Playback<S>&, RayQuery, std::span<const Ray<S>>,         \
+                                 std::span<const RayHit>);
 KBVH_INSTANTIATE(float)
 KBVH_INSTANTIATE(double)
 #undef KBVH_INSTANTIATE

@@ -16,16 +16,16 @@ template <class S>
 void brute_force_hits(const Scene<S>& scene, Playback<S>& playback, RayQuery query,
                       std::span<const Ray<S>> rays, std::span<RayHit> hits);
 
-/// The comparison of answers to rays with the truth.
-struct RayCheck {
-  std::uint64_t rays = 0;
-  std::uint64_t hits = 0;       ///< rays that truly meet something
+/// The comparison of answers to rays or balls with the truth.
+struct ProbeCheck {
+  std::uint64_t probes = 0;     ///< rays or balls that were compared
+  std::uint64_t hits = 0;       ///< rays that truly meet something; primitives within balls
   std::uint64_t missed = 0;     ///< of these, reported as misses
-  std::uint64_t extra = 0;      ///< rays that meet nothing, reported as hits
+  std::uint64_t extra = 0;      ///< reported as hits, and are none
   std::uint64_t misplaced = 0;  ///< hits of another primitive, or at another parameter, than the truth
   std::string first_violation;  ///< the first of these: ray, answer and truth; or empty
 
-  void add(const RayCheck& other);
+  void add(const ProbeCheck& other);
   /// Returns whether all answers are exact.
   bool holds() const { return missed + extra + misplaced == 0; }
 };
@@ -33,9 +33,9 @@ struct RayCheck {
 /// Compares answers at the playback's current time with the closest hits `truth`. Closest hits must be equal;
 /// a reported "any hit" must be a primitive that the ray meets at that parameter.
 template <class S>
-RayCheck compare_hits(const Scene<S>& scene, const Playback<S>& playback, RayQuery query,
-                      std::span<const Ray<S>> rays, std::span<const RayHit> found,
-                      std::span<const RayHit> truth);
+ProbeCheck compare_hits(const Scene<S>& scene, const Playback<S>& playback, RayQuery query,
+                        std::span<const Ray<S>> rays, std::span<const RayHit> found,
+                        std::span<const RayHit> truth);
 
 /// Finds the primitives within balls at the playback's current time, sorted, by comparing the distance to
 /// every living primitive, in exact arithmetic where bounded doubles do not decide: no boxes of bodies or
@@ -44,11 +44,11 @@ template <class S>
 BallHits brute_force_within(const Scene<S>& scene, Playback<S>& playback, std::span<const Ball<S>> balls);
 
 /// Compares sorted answers to `balls` balls with the truth: every primitive within a ball counts.
-RayCheck compare_within(std::size_t balls, const BallHits& found, const BallHits& truth);
+ProbeCheck compare_within(std::size_t balls, const BallHits& found, const BallHits& truth);
 
 /// Does the same as `compare_hits`, with the truth by brute force.
 template <class S>
-RayCheck check_hits(const Scene<S>& scene, Playback<S>& playback, RayQuery query,
-                    std::span<const Ray<S>> rays, std::span<const RayHit> found);
+ProbeCheck check_hits(const Scene<S>& scene, Playback<S>& playback, RayQuery query,
+                      std::span<const Ray<S>> rays, std::span<const RayHit> found);
 
 }  // namespace kbvh

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "experiments/common/text.hpp"
+#include "experiments/study/best_refit.hpp"
 #include "experiments/study/times_record.hpp"
 
 namespace kbvh::experiments {
@@ -114,6 +115,12 @@ std::string disturbed(const json& record) {
   return has_times(record) ? record.at("times").value("disturbed", std::string()) : std::string();
 }
 
+namespace {
+std::optional<RawTimes> times_of(const json& record) {
+  return has_times(record) ? std::optional(raw_times(record)) : std::nullopt;
+}
+}  // namespace
+
 bool is_baseline(const json& record) {
   const json& strategy = record.at("strategy");
   // Records from before baselines were declared: the family decides.
@@ -121,23 +128,24 @@ bool is_baseline(const json& record) {
   return declared == strategy.end() ? strategy.at("family") == "refit" : declared->get<bool>();
 }
 
-double clip_total(const json& record) {
-  return time_of(record, "total_with_motion");
-}
-
 const json* shortest_clip(const std::vector<const json*>& records) {
-  const json* best = nullptr;
-  for (const json* record : records)
-    if (has_times(*record) && (best == nullptr || clip_total(*record) < clip_total(*best))) best = record;
-  return best;
+  std::vector<std::optional<RawTimes>> times;
+  for (const json* record : records) times.push_back(times_of(*record));
+  std::vector<const RawTimes*> known;
+  for (const auto& one : times) known.push_back(one ? &*one : nullptr);
+  const auto best = shortest_clip(known);
+  return best ? records[*best] : nullptr;
 }
 
 const json* best_refit(const std::vector<json>& records) {
-  std::vector<const json*> baselines;
-  for (const json& record : records)
-    if (is_baseline(record) && record.at("strategy").value("guarantee", "") != "approximate")
-      baselines.push_back(&record);
-  return shortest_clip(baselines);
+  std::vector<std::optional<RawTimes>> times;
+  for (const json& record : records) times.push_back(times_of(record));
+  std::vector<RefitCandidate> table;
+  for (std::size_t i = 0; i < records.size(); ++i)
+    table.push_back({times[i] ? &*times[i] : nullptr, is_baseline(records[i]),
+                     records[i].at("strategy").value("guarantee", "") == "approximate"});
+  const auto best = best_refit(table);
+  return best ? &records[*best] : nullptr;
 }
 
 std::string instructions_of(const json& record) {

@@ -38,18 +38,11 @@ std::string disturbed(const nlohmann::json& record);
 /// are classified by the family "refit".
 bool is_baseline(const nlohmann::json& record);
 
-/// Returns the time of the contestant's whole clip, in ms per frame, by which the best refit and the best of
-/// several configurations are chosen: the median over repetitions of all phases. The evaluation of positions
-/// counts: some baselines fetch them in their own phases. The record must have times. `clip_total` of
-/// analysis/ratios/ratios.py is the same number; tests compare the choices.
-double clip_total(const nlohmann::json& record);
-
-/// Returns the record with the smallest `clip_total`, the first of equal ones; nullptr if none has times.
+/// Returns the record with the smallest `clip_total` (experiments/study/best_refit.hpp), the first of equal
+/// ones; nullptr if none has times.
 const nlohmann::json* shortest_clip(const std::vector<const nlohmann::json*>& records);
 
-/// Returns the best refit among the records of one table: the verified baseline with the smallest
-/// `clip_total`, or nullptr. It is the one denominator of the table: its phases are the denominators of
-/// ratios of phases.
+/// Returns the best refit among the records of one table (experiments/study/best_refit.hpp), or nullptr.
 const nlohmann::json* best_refit(const std::vector<nlohmann::json>& records);
 
 /// Returns the instruction set of the contestant's code: that of a peer library, of the parameter `kernels`,

@@ -37,7 +37,7 @@ void ProbeMeasurement<S>::verify(ProbeEntrant<S>& entrant, std::uint64_t oracle_
     ++measured.verification.frames;
     return found;
   });
-  const RayCheck& check = entrant.check;
+  const ProbeCheck& check = entrant.check;
   measured.verification.pairs = check.hits;
   measured.verification.candidates = check.hits;
   measured.verification.missed = check.missed;
@@ -82,7 +82,7 @@ nlohmann::json ProbeMeasurement<S>::extras(std::size_t i) const {
   return {{key_of(study_),
            {{"per_frame", probes_->size()},
             {"hits", entrant.hits},
-            {"compared", entrant.check.rays},
+            {"compared", entrant.check.probes},
             {"missed", entrant.check.missed},
             {"extra", entrant.check.extra},
             {"misplaced", entrant.check.misplaced},

@@ -12,7 +12,7 @@ namespace kbvh::experiments {
 /// A contestant, with its record's data about probes.
 template <class S>
 struct ProbeEntrant : Entrant<S> {
-  RayCheck check;
+  ProbeCheck check;
   std::uint64_t hits = 0;  ///< of all probes at all frames
   /// Bodies of polygons that no probe of a frame meets, summed over frames: of rays, what occlusion culling
   /// can skip.

@@ -139,7 +139,7 @@ class RaySet final : public ProbeSet<S> {
   }
   std::size_t size() const override { return rays_.size(); }
   Probes<S> probes() override { return RayProbes<S>{query_, rays_, hits_}; }
-  RayCheck check(Session<S>& session, std::size_t frame) override {
+  ProbeCheck check(Session<S>& session, std::size_t frame) override {
     session.playback().evaluate_all();
     std::vector<RayHit>& truth = truth_[frame];
     if (truth.size() != some_.size()) {
@@ -198,7 +198,7 @@ class BallSet final : public ProbeSet<S> {
   }
   std::size_t size() const override { return balls_.size(); }
   Probes<S> probes() override { return BallProbes<S>{balls_, &found_}; }
-  RayCheck check(Session<S>& session, std::size_t frame) override {
+  ProbeCheck check(Session<S>& session, std::size_t frame) override {
     session.playback().evaluate_all();
     std::optional<BallHits>& truth = truth_[frame];
     if (!truth) truth = brute_force_within<S>(session.scene(), session.playback(), some_);

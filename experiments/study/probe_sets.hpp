@@ -50,7 +50,7 @@ class ProbeSet {
   /// Returns the question, for checks of its range.
   virtual Probes<S> probes() = 0;
   /// Compares some of the last answers with brute force, whose answers are kept by frame.
-  virtual RayCheck check(Session<S>& session, std::size_t frame) = 0;
+  virtual ProbeCheck check(Session<S>& session, std::size_t frame) = 0;
   /// Keeps those last answers of a frame that are compared.
   virtual void remember(std::size_t frame) = 0;
   virtual void forget() = 0;

@@ -98,8 +98,8 @@ std::string rays_violation(const StrategyEntry& entry, const TestScene<S>& test,
     std::sort(pairs.begin(), pairs.end());
     session.playback().evaluate_all();
     for (const RayQuery query : {RayQuery::closest, RayQuery::any}) {
-      const RayCheck check = compare_hits<S>(session.scene(), session.playback(), query, expected.rays,
-                                             found[query == RayQuery::any ? 1 : 0], expected.hits);
+      const ProbeCheck check = compare_hits<S>(session.scene(), session.playback(), query, expected.rays,
+                                               found[query == RayQuery::any ? 1 : 0], expected.hits);
       hits += check.hits;
       if (!check.holds() && entry.info.rays_guarantee == Guarantee::exact && violation.empty())
         violation = where + check.first_violation;

@@ -34,7 +34,7 @@ std::string within_violation(const StrategyEntry& entry, const TestScene<S>& tes
     BallHits found;
     session.probe(BallProbes<S>{known.balls, &found}, ignored);
     std::sort(found.begin(), found.end());
-    const RayCheck check = compare_within(known.balls.size(), found, known.hits);
+    const ProbeCheck check = compare_within(known.balls.size(), found, known.hits);
     hits += check.hits;
     if (!check.holds() && violation.empty())
       violation = "frame " + std::to_string(frame) + ": " + check.first_violation;

@@ -137,8 +137,8 @@ int check_rays(const Scene<float>& scene, const char* id) {
     if (f % 4 != 0) session.strategy().pairs_at(t, pairs);
     session.probe(RayProbes<float>{RayQuery::closest, rays, std::span<RayHit>(hits)}, ignored);
     session.playback().evaluate_all();
-    const RayCheck check = check_hits<float>(session.scene(), session.playback(), RayQuery::closest,
-                                             std::span<const Ray<float>>(rays), hits);
+    const ProbeCheck check = check_hits<float>(session.scene(), session.playback(), RayQuery::closest,
+                                               std::span<const Ray<float>>(rays), hits);
     EXPECT_TRUE(check.holds()) << id << ", frame " << f << ": " << check.first_violation;
     found += check.hits;
   }
@@ -186,7 +186,7 @@ void check_old_boxes(const char* name, std::uint64_t& found) {
     TriangleTestStats stats;
     std::uint64_t tests = 0;
     drift.answer(trees, bodies, true, RayProbes<S>{RayQuery::closest, rays, hits}, stats, tests, nullptr);
-    const RayCheck check =
+    const ProbeCheck check =
         check_hits<S>(test.scene, playback, RayQuery::closest, std::span<const Ray<S>>(rays), hits);
     EXPECT_TRUE(check.holds()) << name << ", frame " << f << ": " << check.first_violation;
     found += check.hits;

@@ -448,7 +448,8 @@ void check_wide_rays() {
             const std::vector<RayHit> hits =
                 wide_hits<S>(scene, playback, {.method = BuildMethod::sah, .width = width, .leaf_size = leaf},
                              set, query, rays, tests);
-            const RayCheck check = check_hits<S>(scene, playback, query, rays, std::span<const RayHit>(hits));
+            const ProbeCheck check =
+                check_hits<S>(scene, playback, query, rays, std::span<const RayHit>(hits));
             ASSERT_TRUE(check.holds()) << name(set) << ", width " << width << ", leaf " << leaf << ", "
                                        << primitives << ": " << check.first_violation;
             hit += check.hits;
