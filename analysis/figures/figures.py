@@ -95,9 +95,11 @@ def draw_cost_split(axes: Axes, rows: pd.DataFrame, looks: Looks) -> None:
         limit *= 1.12
     left = np.zeros(len(rows))
     shown = [phase for phase in PHASES if rows[f"middle_{phase}"].max() > 0]
+    sums = rows[[f"middle_{phase}" for phase in shown]].sum(axis=1).to_numpy()
+    scale = np.divide(totals, sums, out=np.ones(len(rows)), where=sums > 0)  # a sum of medians is not the median of the sum
     for phase in shown:
         colour, hatch = PHASES[phase]
-        ends = np.minimum(left + rows[f"middle_{phase}"].to_numpy(), limit)
+        ends = np.minimum(left + scale * rows[f"middle_{phase}"].to_numpy(), limit)
         axes.barh(range(len(rows)), ends - left, left=left, height=0.66, color=colour, hatch=hatch,
                   edgecolor="#33415C" if hatch else "white", linewidth=0.4)  # fmt: skip
         left = ends
