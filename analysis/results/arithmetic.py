@@ -43,6 +43,7 @@ def functions() -> ctypes.CDLL:
         ("replicates", None, (address, text, address)),
         ("ratio", ctypes.c_int, (address, address, text, ctypes.c_int, address)),
         ("clip_total", number, (address,)),
+        ("doubts", text, (address, text)),
         ("best_refit", ctypes.c_int64, (ctypes.c_size_t, address, ctypes.c_char_p, ctypes.c_char_p)),
         ("paid_from", ctypes.c_int64, (address, number, address, number)),
     ):

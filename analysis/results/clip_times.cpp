@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -102,6 +103,13 @@ int kbvh_times_ratio(Times* numerator, Times* denominator, const char* phase, in
 /// Returns the time by which contestants are ranked.
 double kbvh_times_clip_total(const Times* times) {
   return clip_total(times->raw);
+}
+
+/// Returns why times are disturbed; the text lives until the next call of this thread.
+const char* kbvh_times_doubts(const Times* times, const char* recorded) {
+  static thread_local std::string text;
+  text = doubts(times->raw, recorded);
+  return text.c_str();
 }
 
 /// Returns the index of the best refit; -1 if there is none. A null pointer is a contestant without times.

@@ -38,7 +38,7 @@ class RawTimes:
     steady_from: Optional[int]
     by_clips: bool
     session: str
-    disturbed: str = ""
+    disturbed: str = ""  #: why, as recorded; a study that was loaded has `doubts` here
     _handle: Optional[int] = field(default=None, repr=False, compare=False)
 
     @property
@@ -90,6 +90,11 @@ def clip_total(times: RawTimes) -> float:
     all phases, positions included (some baselines fetch them in their own phases). The explorer's `clipTotal` is the same number.
     """
     return float(arithmetic.functions().kbvh_times_clip_total(times.handle))
+
+
+def doubts(times: RawTimes) -> str:
+    """Returns why times are disturbed, or "": the recorded reasons, and repetitions that differ although their work is the same."""
+    return str(arithmetic.functions().kbvh_times_doubts(times.handle, times.disturbed.encode()).decode())
 
 
 def best_refit(times: Sequence[Optional[RawTimes]], baseline: Sequence[bool], approximate: Sequence[bool]) -> Optional[int]:

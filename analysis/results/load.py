@@ -119,6 +119,7 @@ def load(folder: Path, newest_of: tuple[str, ...] = ONE_OF_ALL_COMMITS) -> Study
             times = repetitions_of(record, index, row)
             if times:
                 raw[index] = raw_times_of(record, row)
+                row["disturbed"] = raw[index].disturbed = clip_times.doubts(raw[index])
         except ResultError as problem:
             notes.append(f"Line {index + 1} of {FILE_NAME} was skipped: {str(problem).removeprefix(place).lstrip(':, ')}")
             continue

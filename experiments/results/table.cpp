@@ -112,7 +112,8 @@ std::optional<RatioOfTimes> ratio_of(const json& numerator, const std::string& p
 }
 
 std::string disturbed(const json& record) {
-  return has_times(record) ? record.at("times").value("disturbed", std::string()) : std::string();
+  if (!has_times(record)) return {};
+  return doubts(raw_times(record), record.at("times").value("disturbed", std::string()));
 }
 
 namespace {

@@ -31,7 +31,7 @@ double time_of(const nlohmann::json& record, const std::string& phase);
 std::optional<RatioOfTimes> ratio_of(const nlohmann::json& numerator, const std::string& phase,
                                      const nlohmann::json& denominator, const std::string& phase_below);
 
-/// Returns why the times of a record were disturbed, or ""; also for records that do not say it.
+/// Returns why the times of a record were disturbed (`doubts` of experiments/study/raw_times.hpp), or "".
 std::string disturbed(const nlohmann::json& record);
 
 /// Returns whether the record is of a baseline (Info::baseline). Records from before baselines were declared

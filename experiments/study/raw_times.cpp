@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <numeric>
 #include <tuple>
 
@@ -205,6 +206,28 @@ std::optional<RatioOfTimes> ratio_of(const TimeOf& numerator, const TimeOf& deno
 std::optional<RatioOfTimes> ratio_of(Resamples& numerator, Resamples& denominator, std::string_view phase,
                                      Part part) {
   return ratio_of(numerator, phase, denominator, phase, part);
+}
+
+double variation(const RawTimes& times) {
+  const std::size_t n = times.repetitions();
+  if (n < fewest_of_an_interval) return 1;
+  std::vector<double> clips;
+  for (std::size_t r = 0; r < n; ++r) {
+    double clip = 0;
+    for (std::size_t f = 0; f < times.frames(); ++f) clip += times.totals[r][f] + times.motions[r][f];
+    clips.push_back(clip);
+  }
+  std::sort(clips.begin(), clips.end());
+  const double lower = clips[n / 4], upper = clips[n - 1 - n / 4];
+  return lower > 0 ? upper / lower : 1;
+}
+
+std::string doubts(const RawTimes& times, std::string recorded) {
+  const double found = variation(times);
+  if (!(found > most_variation)) return recorded;
+  char text[64];
+  std::snprintf(text, sizeof text, "its repetitions differ by a factor of %.2f", found);
+  return recorded.empty() ? text : recorded + ", " + text;
 }
 
 std::optional<std::size_t> paid_from(const RawTimes& own, double own_preparation, const RawTimes& other,

@@ -88,6 +88,15 @@ struct TimeOf {
 std::optional<RatioOfTimes> ratio_of(const TimeOf& numerator, const TimeOf& denominator,
                                      Part part = Part::clip);
 
+/// Above this the times of a contestant are disturbed: the work of its repetitions is the same.
+inline constexpr double most_variation = 1.25;
+/// Returns the upper quartile of the repetitions' clips, positions included, over the lower one; 1 with fewer
+/// than five repetitions. It is large where something slowed down whole repetitions, also what no processor
+/// waits for: a neighbour that shares caches or memory, a clock that changes.
+double variation(const RawTimes& times);
+/// Returns why times are disturbed, in words, or "": the recorded reasons, and a large variation.
+std::string doubts(const RawTimes& times, std::string recorded);
+
 /// Returns the first frame at which a contestant has paid for its preparation and its beginning: from there
 /// on, the sum of its preparation (ms) and its frames so far never exceeds the other's. Nothing if there is
 /// no such frame. Uses medians of frames.

@@ -234,6 +234,15 @@ class TestFrames(unittest.TestCase):
         with self.assertRaisesRegex(load.ResultError, "schema 3 is not known"):
             self.load(dict(old, schema=3))
 
+    def test_repetitions_that_differ_are_disturbed_though_no_processor_was_missed(self) -> None:
+        steady, other = clip("a", "refit", [[4]] * 5), clip("k", "kinetic", [[2], [2], [2.4], [3], [3]])
+        study = self.load(steady, other)
+        self.assertEqual([study.raw[run].disturbed for run in (0, 1)], ["", "its repetitions differ by a factor of 1.33"])
+        self.assertEqual(list(study.runs["disturbed"]), ["", "its repetitions differ by a factor of 1.33"])
+        # One slow repetition of five is none of their quartiles; four repetitions have none.
+        study = self.load(clip("a", "refit", [[4]] * 4 + [[9]]), clip("k", "kinetic", [[2], [2], [9], [9]]))
+        self.assertEqual(list(study.runs["disturbed"]), ["", ""])
+
     def test_a_disturbed_machine_is_seen_at_the_ratio(self) -> None:
         study = self.load(clip("a", "refit", [[4]] * 5), clip("k", "kinetic", [[2]] * 5, disturbed="90 involuntary switches"))
         found = ratios.ratios(study, "without_motion")

@@ -210,6 +210,34 @@ TEST(Times, ADisturbedFrameDoesNotCount) {
   EXPECT_EQ(record.at("times").at("repetitions")[4].at("steady").at("update"), 15);
 }
 
+// A neighbour that shares memory takes no time slices, but slows down whole repetitions.
+TEST(Times, RepetitionsThatDifferAreDisturbed) {
+  const auto times = [](const std::vector<double>& clips) {
+    Measured measured;
+    for (const double clip : clips) measured.repetitions.push_back(clip_of({clip, clip}, 0));
+    return raw_times(measured, "s");
+  };
+  EXPECT_EQ(doubts(times({4, 4.9, 4.1, 4, 5}), ""), "") << "quartiles: 4 and 4.9";
+  EXPECT_EQ(doubts(times({4, 5.2, 4.1, 4, 5.3}), ""), "its repetitions differ by a factor of 1.30");
+  EXPECT_EQ(doubts(times({4, 4, 4, 4, 40}), "9 involuntary switches"), "9 involuntary switches");
+  EXPECT_EQ(doubts(times({4, 40, 4, 40, 40}), "9 involuntary switches"),
+            "9 involuntary switches, its repetitions differ by a factor of 10.00");
+  EXPECT_EQ(doubts(times({4, 40, 4, 40}), ""), "") << "four have no quartiles";
+  const auto record = [&](const RawTimes& raw) {
+    json one{{"run", "s"}, {"scene", {{"frames", 2}}}, {"times", {{"disturbed", ""}, {"by", "frames"}}}};
+    for (std::size_t r = 0; r < raw.repetitions(); ++r)
+      one["times"]["repetitions"].push_back({{"motion", 0},
+                                             {"update", raw.totals[r][0]},
+                                             {"traversal", 0},
+                                             {"triangle_tests", 0},
+                                             {"totals", raw.totals[r]},
+                                             {"motions", raw.motions[r]}});
+    return one;
+  };
+  EXPECT_EQ(disturbed(record(times({4, 4, 4, 4, 40}))), "");
+  EXPECT_EQ(disturbed(record(times({4, 5.2, 4.1, 4, 5.3}))), "its repetitions differ by a factor of 1.30");
+}
+
 // If one side is counted by clips, both are.
 TEST(Times, RatiosCountBothSidesTheSameWay) {
   Measured one, two;

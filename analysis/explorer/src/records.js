@@ -1,6 +1,7 @@
 // Reads results.jsonl in the page: what load.py and explorer_data.py make of it, without claims. A test compares both.
 import { looks } from "./looks.js";
 import { lazyDraws, middles } from "./clips.js";
+import { doubts } from "./statistics.js";
 
 const PHASES = ["motion", "update", "traversal", "triangle_tests", "plan_changes"];
 const MACHINE = ["cpu", "kernels", "simd", "compiler", "flags", "build_type", "os", "cores", "memory_gb"];
@@ -302,7 +303,7 @@ function runOf(row) {
     verified_frames: number(verified.frames),
     ...Object.fromEntries(COUNTERS.map((name) => [name, number(frames > 0 ? counters[name] / frames : counters[name], 5)])),
     refused: row.refused,
-    disturbed: record.times?.disturbed ?? "",
+    disturbed: doubts(times?.repetitions ?? [], times?.disturbed ?? ""),
     clips,
     times: repetitions,
     middle: repetitions.length ? middles(raw) : [],

@@ -31,6 +31,22 @@ export const DRAWS = 200;
 const LEFT_OUT = DRAWS / 40;
 const drawn = new Map();
 
+/** Above this the times of a contestant are disturbed: the work of its repetitions is the same. */
+export const MOST_VARIATION = 1.25;
+
+/** Returns why times are disturbed, or "": the recorded reasons, and repetitions that differ (experiments/study/raw_times.hpp). */
+export function doubts(repetitions, recorded) {
+  const n = repetitions.length;
+  if (n < FEWEST_OF_AN_INTERVAL) return recorded;
+  const total = (one) => [...(one.totals ?? []), ...(one.motions ?? [])].reduce((sum, value) => sum + value, 0);
+  const clips = repetitions.map((one) => (one.totals ? total(one) : PARTS_OF_A_CLIP.reduce((sum, part) => sum + (one[part] ?? 0), 0)));
+  clips.sort((a, b) => a - b);
+  const [lower, upper] = [clips[n >> 2], clips[n - 1 - (n >> 2)]];
+  if (!(lower > 0 && upper / lower > MOST_VARIATION)) return recorded;
+  return [recorded, `its repetitions differ by a factor of ${(upper / lower).toFixed(2)}`].filter(Boolean).join(", ");
+}
+const PARTS_OF_A_CLIP = [...SCOPES.with_motion, "geometry_changes"];
+
 /** Returns the resampled rounds, the same as in experiments/study/raw_times.cpp (Steele, Lea and Flood 2014). */
 export function resamples(repetitions) {
   if (drawn.has(repetitions)) return drawn.get(repetitions);
