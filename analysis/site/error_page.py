@@ -20,6 +20,8 @@ COLOURS = """<style>
 .errors .tag { font-size: .75rem; color: var(--accent); }
 .errors figcaption.title { display: none; }  /* the heading says it */
 .errors summary { cursor: pointer; }
+@media (max-width: 760px) { .errors .error-table { font-size: .7rem; } .errors .error-table :is(td, th) { padding: .25rem .2rem .25rem 0; }
+  .errors .error-table .n { padding-left: .1rem; overflow-wrap: anywhere; } }
 body[data-theme="dark"] .errors [style] { --paint: var(--d); }
 body[data-theme="light"] .errors [style] { --paint: var(--l); }
 </style>"""
@@ -45,7 +47,8 @@ def page(results: Path) -> str:
     macros = environment().get_template("error_figure.html.j2").module
     html = [COLOURS, str(macros.style())]  # type: ignore[attr-defined]
     for one in found:
-        lines += [f"## {one.place.title}", "", *(f"{said}\n" for said in one.sentences), f"{one.place.measured}", ""]
+        title = one.place.title.replace(" = ", "\u00a0=\u00a0")
+        lines += [f"## {title}", "", *(f"{said}\n" for said in one.sentences), f"{one.place.measured}", ""]
         html.append(str(macros.figure(one, time_error.SLOW, True)))  # type: ignore[attr-defined]
         lines += ["```{raw} html", '<div class="errors">', *html, "</div>", "```", ""]
         html = []

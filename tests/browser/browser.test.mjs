@@ -177,8 +177,8 @@ test('a glTF file of 20,000 triangles plays', async (t) => {
 for (const file of ['index.html', 'lab.html'])
   test(`the lab opens from ${file}`, { skip: existsSync(lab + file) ? false : 'the lab is not built (experiments/lab)' }, async () => {
     const opened = await openFile(chromium.browser, lab + file);
-    await opened.waitForFunction(() => document.querySelector('canvas, svg') !== null, { timeout: 60000 });
-    await new Promise((resolve) => setTimeout(resolve, 1500));
+    await opened.waitForFunction(() => document.querySelector('canvas, svg') !== null && document.querySelector('[data-kbvh-lab-page]').lab?.state.phase === 'ready');
+    await opened.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
     nothingWrong(opened);
     await opened.close();
   });

@@ -82,6 +82,7 @@ def expectations(folder: Path, study: Any) -> dict[str, Any]:
     """Returns what the page should compute."""
     from advice import advice
     from ratios import profiles, ratios
+    from results import clip_times
     from results.load import load
 
     runs = study.runs
@@ -93,6 +94,15 @@ def expectations(folder: Path, study: Any) -> dict[str, Any]:
         for run, found in ratios.ratios(study, scope).items():
             row[place[run]] = described(found)
         against_refit[scope] = row
+    spans: list[Any] = [None] * len(runs)  # of times, in ms per frame
+    for run, times in study.raw.items():
+        if times.repetitions < clip_times.FEWEST_OF_AN_INTERVAL:
+            ends = sorted(clip_times.single_times(times, ratios.SCOPES["with_motion"]))
+            spans[place[run]] = [ends[0], ends[-1], False]
+        elif not times.by_clips:
+            ends = sorted(clip_times.replicates(times, ratios.SCOPES["with_motion"]))
+            cut = clip_times.DRAWS // 40
+            spans[place[run]] = [ends[cut], ends[-1 - cut], True]
     chosen = "kinetic_aabb"
     pairwise: list[Any] = [None] * len(runs)
     for _, group in study.timed.groupby(["group", "commit", "dirty"]):
@@ -121,6 +131,7 @@ def expectations(folder: Path, study: Any) -> dict[str, Any]:
                                     ("query", "query"), ("worst", "worst"))
         },
         "against_refit": against_refit,
+        "spans": spans,
         "chosen": chosen,
         "pairwise": pairwise,
     }  # fmt: skip

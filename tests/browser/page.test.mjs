@@ -9,13 +9,20 @@ let browser;
 before(async () => { browser = await startBrowser(); });
 after(() => browser.close());
 
-/** Opens a page for one test and checks afterwards that nothing went wrong on it. */
-async function withPage(options, job, { expected = [] } = {}) {
-  const opened = await browser.open(options);
+let kept = null; // the tab of the tests that leave the lab as they found it
+/**
+ * Shows a scene for one test and checks afterwards that nothing went wrong on the page. A test that needs a page as it is loaded, or changes
+ * more than the lab's state, says `fresh`; the others share a tab.
+ */
+async function withPage(options, job, { expected = [], fresh = false } = {}) {
+  const opened = fresh || !kept ? await browser.open(options) : kept;
+  if (opened === kept) await kept.show(options);
+  if (!fresh) kept = null; // a test that fails leaves no tab
   await job(opened);
   const unexpected = opened.problems.filter((text) => !expected.some((pattern) => pattern.test(text)));
   assert.deepEqual(unexpected, []);
-  await opened.page.close();
+  if (fresh) await opened.page.close();
+  else kept = opened;
 }
 const press = async ({ page, settle }, ...keys) => {
   for (const key of keys) await page.keyboard.press(key);
@@ -32,7 +39,7 @@ test('a choice that is made while another one loads adds to it', () => withPage(
   });
   await settle();
   assert.deepEqual(await lab(({ state }) => [state.strategy, state.sceneId, state.phase]), ['bottom_up', 'ties-6', 'ready']);
-}));
+}, { fresh: true }));
 
 test('a first visitor gets a hint and a tour, once', () => withPage({ hash: '#scene=overtake-8' }, async ({ page, lab, settle }) => {
   const press = async (text) => {
@@ -67,7 +74,7 @@ test('a first visitor gets a hint and a tour, once', () => withPage({ hash: '#sc
   await page.keyboard.press('Escape');
   await settle();
   assert.equal(await page.$('.tour'), null);
-}));
+}, { fresh: true }));
 
 test('panels that a strategy without events, or without a tree, cannot fill say what they would show', () => withPage({ hash: '#scene=overtake-8' }, async ({ page, lab, settle }) => {
   const unfilled = () => page.evaluate(() => [...document.querySelectorAll('.unfilled')].map((element) => element.closest('.panel').className.match(/panel-(\w+)/)[1]).sort());
@@ -106,7 +113,7 @@ test('settings, messages and captions have words, no ids; headings have units', 
   assert.deepEqual(await page.$$eval('.sides thead th', (heads) => heads.map((head) => head.textContent)), ['Side', 'Value, units', 'Realised by', 'Since, s', 'Until, s']);
   await lab(async (lab) => { lab.view({ panel: 'work' }); await lab.comparison.set({ strategy: 'bottom_up' }); });
   await page.waitForFunction(() => /Time in the engine, ms/.test(document.querySelector('.multiples')?.textContent ?? ''));
-}));
+}, { fresh: true }));
 
 test('at 1280 pixels no select of the bars is cut', () => withPage({ hash: '#scene=cloth-on-box', width: 1280, height: 800 }, async ({ page, lab, settle }) => {
   for (const strategy of ['kinetic_aabb', 'kinetic_separation_list', 'bottom_up']) {
@@ -215,7 +222,7 @@ test('Tab reaches every view, and focus is visible', () => withPage({ hash: '#sc
     seen.add(at.view);
   }
   for (const view of ['stage', 'tree', 'timeline', 'diagram', 'tab']) assert.ok(seen.has(view), `${view} was not reached: ${[...seen]}`);
-}));
+}, { fresh: true }));
 
 test('every control and picture has a name', () => withPage({ hash: '#scene=swarms-12' }, async ({ page, lab, settle }) => {
   for (const panel of ['why', 'box', 'pairs', 'counters', 'edit', 'work']) {
@@ -306,7 +313,7 @@ test('a link keeps the whole state', () => withPage({ hash: '#scene=overtake-8' 
   await third.page.close();
   assert.deepEqual(second.problems, []);
   await second.page.close();
-}));
+}, { fresh: true }));
 
 test('a saved file keeps the whole state, and the page in one file reads it', () => withPage({ hash: '#scene=strip-4' }, async ({ lab }) => {
   const saved = await lab(async (lab) => { await lab.seek(0.5); await lab.event(1); lab.view({ panel: 'box' }); return lab.getState(); });
@@ -325,15 +332,15 @@ test('a saved file keeps the whole state, and the page in one file reads it', ()
 
 test('damaged links and wrong files are refused in words, and nothing is lost', () => withPage({ hash: '#s=abcdefg' }, async ({ page, lab, settle }) => {
   assert.match(await page.$eval('.banner.error', (banner) => banner.textContent), /damaged/);
-  const drop = (name, text) => page.evaluate(async (name, text) => {
+  const drop = (name, text) => page.evaluate((name, text) => {
     const data = new DataTransfer();
     data.items.add(new File([text], name));
     document.querySelector('.kbvh-lab').dispatchEvent(new DragEvent('drop', { dataTransfer: data, bubbles: true, cancelable: true }));
-    await new Promise((resolve) => setTimeout(resolve, 300));
   }, name, text);
   const scene = await lab(({ state }) => state.scene.name);
   for (const [name, text, pattern] of [['bad.obj', 'v 0 0\nf 1 2 3\n', /bad\.obj/], ['bad.json', '{"format": "kbvh-scene"}', /bodies/], ['x.json', '{', /not JSON/], ['notes.txt', 'hello', /notes\.txt/]]) {
     await drop(name, text);
+    await page.waitForFunction((name) => document.querySelector('.banner.error')?.textContent.includes(name), {}, name);
     await settle();
     const message = await page.$eval('.banner.error', (banner) => banner.textContent);
     assert.match(message, pattern, name);
@@ -342,9 +349,9 @@ test('damaged links and wrong files are refused in words, and nothing is lost', 
     assert.equal(await lab(({ state }) => state.scene.name), scene, name);
   }
   await drop('two.obj', 'v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 1\nf 1 2 3\nf 2 3 4\n');
-  await settle();
+  await page.waitForFunction(() => document.querySelector('[data-kbvh-lab-page]').lab.state.info.bodies[0].primitives === 2);
   assert.equal(await lab(({ state }) => state.info.bodies[0].primitives), 2);
-}, { expected: [/bad\.|obj|Error/] }));
+}, { fresh: true, expected: [/bad\.|obj|Error/] }));
 
 test('dragging a vertex recomputes everything; undo brings the scene back', () => withPage({ hash: '#scene=line-4' }, async ({ page, lab, settle }) => {
   await lab(async (lab) => { lab.view({ edit: true, panel: 'edit' }); await lab.seek(2); });
@@ -504,6 +511,15 @@ test('comparing: one clock, work of every frame', () => withPage({ hash: '#scene
   assert.equal(result.boxes[0], result.boxes[1]);
   assert.ok(result.written[1] >= 6 * result.nodes * (result.frames - 1), JSON.stringify(result.written));
   assert.ok(result.written[0] < result.written[1]);
+  // Totals stand there once both have been counted, not before.
+  const told = () => page.$$eval('.multiple', (all) => all.map((one) => `${one.querySelector('figcaption span').textContent} ${one.querySelector('.verdict').textContent}`));
+  await lab((lab) => lab.view({ panel: 'work' }));
+  await settle();
+  const whole = await told();
+  assert.ok(whole.length > 3 && whole.every((text) => /^[\d.]+( [kM])? : [\d.]+/.test(text)), whole.join(', '));
+  await lab((lab) => { const { series } = lab.state.work; lab.store.set({ work: { timed: false, series: [series[0], { ...series[1], done: 0 }] } }); });
+  await settle();
+  assert.deepEqual(new Set(await told()), new Set(['… …']));
 }));
 
 test('nothing sticks out at three sizes, in both schemes', async () => {

@@ -106,6 +106,18 @@ function replicates(run, place, scope, clips) {
 }
 
 /**
+ * Returns the time of a run in ms per frame with its ends, as `ratio` has them: of the 95 % interval or, with fewer than five repetitions, of
+ * their range.
+ */
+export function span(run, place, scope) {
+  const middle = timeOf(run, place, scope);
+  const isInterval = run.times.length >= FEWEST_OF_AN_INTERVAL;
+  const times = (isInterval ? [...replicates(run, place, scope, run.clips)] : every(run).map((r) => byClips(run, place, scope, [r]))).sort((a, b) => a - b);
+  const [low, high] = isInterval ? [times[LEFT_OUT], times[DRAWS - 1 - LEFT_OUT]] : [times[0], times.at(-1)];
+  return { middle, low: Math.min(low, middle), high: Math.max(high, middle), isInterval };
+}
+
+/**
  * Returns how many times faster a run is than another: the middle, and the ends of the 95 % interval (a bootstrap over whole
  * rounds) or, with fewer than five repetitions, of their range; null without times. If one counts by clips, both do. Paired
  * repetitions ran next to each other.

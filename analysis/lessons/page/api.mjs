@@ -16,22 +16,30 @@ const plain = (hierarchies) => hierarchies.map((hierarchy) => hierarchy && { pri
 
 const tuples = (pairs) => Array.from({ length: pairs.length / 4 }, (_, i) => Array.from(pairs.slice(4 * i, 4 * i + 4)));
 
-/// Plays a request on a new engine.
-export async function trace(createEngine, request) {
-  const engine = await createEngine();
-  try {
-    const { scene, strategy, params, topology, precision = "float64", l = 1 } = request, times = frameTimes(scene, l);
-    const { hasEvents } = await engine.load({ scene: { ...scene, frames: { l } }, strategy, params, topology, precision, t0: times[0] });
-    const result = { frames: [], steps: [], hasEvents };
-    for (const time of times) {
-      const state = await engine.frame(time, everything);
-      result.frames.push({ time, pairs: tuples(state.pairs), counters: { ...state.counters }, ...(request.nodes ? { hierarchies: plain(state.hierarchies) } : {}) });
-      if (time === times[0]) result.start = plain(state.hierarchies);
-      if (time === times.at(-1)) result.end = plain(state.hierarchies);
-    }
-    if (hasEvents) result.steps = await engine.history();
-    return result;
-  } finally {
-    engine.close();
+/// Plays a request on an engine.
+async function trace(engine, request) {
+  const { scene, strategy, params, topology, precision = "float64", l = 1 } = request, times = frameTimes(scene, l);
+  const { hasEvents } = await engine.load({ scene: { ...scene, frames: { l } }, strategy, params, topology, precision, t0: times[0] });
+  const result = { frames: [], steps: [], hasEvents };
+  for (const time of times) {
+    const state = await engine.frame(time, everything);
+    result.frames.push({ time, pairs: tuples(state.pairs), counters: { ...state.counters }, ...(request.nodes ? { hierarchies: plain(state.hierarchies) } : {}) });
+    if (time === times[0]) result.start = plain(state.hierarchies);
+    if (time === times.at(-1)) result.end = plain(state.hierarchies);
   }
+  if (hasEvents) result.steps = await engine.history();
+  return result;
+}
+
+/// Returns the function that plays requests, one after the other, all on one engine: to start one takes longer than to play a small scene.
+export function player(createEngine) {
+  let engine = null, last = Promise.resolve();
+  return (request) => {
+    const played = last.then(async () => {
+      engine ??= await createEngine();
+      return trace(engine, request);
+    });
+    last = played.catch(() => {});
+    return played;
+  };
 }

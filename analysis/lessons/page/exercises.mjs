@@ -2,7 +2,7 @@
 import { addressOf, embedCode, encodeState } from "../../lab/src/state/permalink.js";
 import { checkers } from "../checkers/index.mjs";
 import { exerciseStates, states } from "../states.mjs";
-import { trace } from "./api.mjs";
+import { player } from "./api.mjs";
 import { recall, remember } from "./memory.mjs";
 
 export const all = { ...states, ...exerciseStates() };
@@ -66,10 +66,12 @@ export async function open(place, state) {
   return mounted.get(place);
 }
 
-/// The api of checkers, over engines of the lab.
+let play = null;
+/// The api of checkers, over an engine of the lab.
 export async function api() {
   const { createEngine } = await loadLab();
-  return { createEngine, trace: (request) => trace(createEngine, request) };
+  play ??= player(createEngine);
+  return { createEngine, trace: play };
 }
 
 /// The parts that two states of the same work have in common: precision, frames, and the bodies without their names.

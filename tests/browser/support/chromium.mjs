@@ -32,6 +32,7 @@ export async function startBrowser(flags = ['--disable-gpu']) {
 /** Opens a page from a file with the network off. `page.wrong` lists errors and requests that leave the page. */
 export async function openFile(browser, file) {
   const page = await browser.newPage();
+  page.setDefaultTimeout(240000);
   page.wrong = [];
   page.on('console', (message) => {
     if (['error', 'warn'].includes(message.type())) page.wrong.push(`console: ${message.text()}`);

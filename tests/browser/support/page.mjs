@@ -24,6 +24,7 @@ export async function startBrowser() {
  */
 async function open(browser, { hash = '', width = 1440, height = 900, scheme = 'light', file = built } = {}) {
   const page = await browser.newPage();
+  page.setDefaultTimeout(240000); // a busy machine is slow
   const problems = [];
   page.on('console', (message) => { if (message.type() === 'error') problems.push(message.text()); });
   page.on('pageerror', (error) => problems.push(String(error.stack ?? error)));
@@ -32,7 +33,7 @@ async function open(browser, { hash = '', width = 1440, height = 900, scheme = '
   await page.setViewport({ width, height });
   await page.emulateMediaFeatures([{ name: 'prefers-color-scheme', value: scheme }]);
   await page.goto(pathToFileURL(file).href + hash);
-  await page.waitForFunction(() => document.querySelector('[data-kbvh-lab-page]')?.lab?.state.at, { timeout: 60000 });
+  await page.waitForFunction(() => document.querySelector('[data-kbvh-lab-page]')?.lab?.state.at);
   return {
     page, problems,
     /** Runs a function in the page with the lab and arguments. */
@@ -43,5 +44,21 @@ async function open(browser, { hash = '', width = 1440, height = 900, scheme = '
       for (let chain = null; chain !== lab.chain;) { chain = lab.chain; await chain; await new Promise((resolve) => setTimeout(resolve, 20)); }
       await new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
     }),
+    /** Shows another scene in this tab, in a window and a scheme of its own: a lab that is kept costs less than one that is loaded. */
+    async show({ hash = '', width = 1440, height = 900, scheme = 'light' }) {
+      problems.length = 0;
+      await page.bringToFront();
+      await page.setViewport({ width, height });
+      await page.emulateMediaFeatures([{ name: 'prefers-color-scheme', value: scheme }]);
+      await this.lab(async (lab, sceneId) => {
+        document.activeElement?.blur();
+        lab.view({ theme: 'auto' });
+        lab.store.set({ error: '', choice: null, notice: '', speed: 1 });
+        await lab.comparison.set(null);
+        await lab.setState({ format: 'kbvh-lab', version: 1, sceneId });
+        scrollTo(0, 0);
+      }, /^#scene=([\w-]+)$/.exec(hash)?.[1] ?? 'overtake-8');
+      await this.settle();
+    },
   };
 }

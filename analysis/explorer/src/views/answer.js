@@ -3,6 +3,7 @@ import { FRAMES, KNOWN, PAIRS, SIZES, classOf, countedCells, ranked } from "../a
 import { tableOf } from "../chart.js";
 import { choice, make, symbol } from "../dom.js";
 import { SIX, compare, ratioText, value } from "../model.js";
+import { span } from "../statistics.js";
 import { factor, milliseconds, plural } from "../words.js";
 import { sweepFigure, sweeps } from "./scaling.js";
 
@@ -20,7 +21,9 @@ export function asked(model, state) {
   const counts = Object.fromEntries(
     Object.keys(FRAMES).map((key) => [key, matching.filter(({ cell }) => classOf(FRAMES, cell.l) === key).length]),
   );
-  const frames = counts[state.frames] ? state.frames : Object.keys(FRAMES).findLast((key) => counts[key]);
+  // Positions that arrive frame by frame are keyframes; motion that is known has frames between its keyframes.
+  const classes = Object.keys(FRAMES).filter((key) => counts[key]);
+  const frames = counts[state.frames] ? state.frames : state.know === "none" ? classes[0] : classes.at(-1);
   return {
     ...{ kinds, asks, scenes, scene, sizes, size, counts, frames, matching },
     cells: matching.filter(({ cell }) => classOf(FRAMES, cell.l) === frames),
@@ -72,7 +75,7 @@ function questions({ state, set }, found) {
     "section",
     { class: "questions", "aria-label": "Questions" },
     buttons("1. What do you know of the future?", names(KNOWN), state.know, (know) => set({ know })),
-    buttons("2. Frames a keyframe?", names(FRAMES), found.frames, (frames) => set({ frames }), (key) => !found.counts[key]),
+    buttons("2. Frames a keyframe? (Positions only: 1)", names(FRAMES), found.frames, (frames) => set({ frames }), (key) => !found.counts[key]),
     make(
       "div",
       {},
@@ -105,28 +108,54 @@ export function speedText(one) {
   return `${factor(one.speed)} times as fast as the best refit (${of}${missing}${one.disturbed ? "; the machine was disturbed" : ""})`;
 }
 
+/** What a guarantee promises of the answers. */
+const PROMISES = { exact: "its answers are exact", candidate_superset: "it misses nothing, and may report some pairs too many" };
+
+/** Tells what a strategy costs: in one cell with the ends of its time, in several from the cheapest to the most expensive one. */
+export function costText(model, one) {
+  const runs = one.own.map(({ runs }) => runs.get(one.id));
+  if (one.cells === 1) {
+    const { middle, low, high, isInterval } = span(runs[0], model.place, "with_motion");
+    const [at, from, to] = [middle, low, high].map(milliseconds);
+    return from === to ? `${at} ms a frame` : `${at} ms a frame (${isInterval ? "95\u00a0% interval" : "range of its rounds"} ${from} to ${to})`;
+  }
+  const times = runs.map((run) => value(model, run, "with_motion"));
+  const [low, high] = [Math.min(...times), Math.max(...times)].map(milliseconds);
+  return `${low === high ? low : `${low} to ${high}`} ms a frame`;
+}
+
 function said({ model, state, set }, found, order) {
   const best = order[0];
   if (!best) return make("section", { class: "answer" }, make("p", { text: "No strategy was measured in half of these cells." }));
-  const times = best.own.map(({ runs }) => value(model, runs.get(best.id), "with_motion"));
-  const [low, high] = [Math.min(...times), Math.max(...times)].map(milliseconds);
   const more = Object.keys(KNOWN)
     .slice(Object.keys(KNOWN).indexOf(state.know) + 1)
     .map((known) => [known, ranked(model, found.cells, known)[0]])
     .find(([, one]) => one.id !== best.id);
+  const scenes = new Set(found.cells.map(({ cell }) => cell.scene));
+  const { cell } = found.cells[0];
+  const of =
+    best.cells === 1
+      ? cell.title.replace(`${cell.scene}, ${cell.size}`, () => `${cell.scene} with ${cell.size} primitives`)
+      : `${plural(best.cells, "cell")} of ${scenes.size === 1 ? cell.scene : plural(scenes.size, "scene")}`;
   return make(
     "section",
     { class: "answer", "aria-live": "polite" },
-    make("p", { class: "take" }, "Take ", symbol(best.contestant), make("strong", { text: best.contestant.title })),
-    make("p", { class: "speed", text: speedText(best) }),
-    make("p", { text: `${low === high ? low : `${low} to ${high}`} ms a frame, positions included. ` }, make("code", { text: best.id }), " on the command line."),
-    order[1] && make("p", { class: "note", text: `Next: ${order[1].contestant.title}, ${speedText(order[1])}.` }),
+    make("p", { class: "take" }, "Take ", symbol(best.contestant), make("strong", { text: best.contestant.title }), `: ${costText(model, best)}.`),
+    make("p", { class: "speed", text: `That is ${speedText(best)}.` }),
+    make(
+      "p",
+      {},
+      `Measured on one thread in ${of}, positions included; ${PROMISES[best.contestant.guarantee]}. It is called `,
+      make("code", { text: best.id }),
+      " on the command line and in code.",
+    ),
+    order[1] && make("p", { class: "note", text: `Next: ${order[1].contestant.title}, ${costText(model, order[1])}; ${speedText(order[1])}.` }),
     more &&
       make(
         "p",
         { class: "note" },
         make("button", { type: "button", class: "quiet", text: `If ${KNOWN[more[0]].words}`, click: () => set({ know: more[0] }) }),
-        ` ${more[1].contestant.title}: ${speedText(more[1])}.`,
+        ` take ${more[1].contestant.title}: ${costText(model, more[1])}; ${speedText(more[1])}.`,
       ),
   );
 }
@@ -180,6 +209,7 @@ function cost({ model, choose }, found, best) {
     "section",
     {},
     make("h2", { text: "What it costs, scene by scene" }),
+    make("p", { class: "note", text: "Each line is a cell: one scene at one size, with l frames from a keyframe to the next." }),
     make("div", { class: "scroll", tabindex: 0 }, tableOf(["scene", `${best.contestant.title}, ms`, "best refit", "ms", "times as fast"], rows)),
   );
 }

@@ -1,0 +1,134 @@
+// Every view in both schemes and three widths; the report; a large study.
+import assert from "node:assert/strict";
+import { statSync } from "node:fs";
+
+import { check, expected, leave, load, open } from "../support/explorer.mjs";
+
+const VIEWS = ["answer", "overview", "pairwise", "errors", "scaling", "frames", "versus", "claims", "runs"];
+
+// --- every view, both schemes, three widths -------------------------------------------------------------------
+
+for (const [which, views] of [
+  ["reference", VIEWS],
+  ["merged", ["answer", "overview", "versus"]],
+])
+  for (const view of views)
+    for (const [width, scheme] of [
+      [1440, "light"],
+      [1024, "dark"],
+      [390, "light"],
+      [390, "dark"],
+    ])
+      await check(`${which}: ${view} at ${width}, ${scheme}`, async () => {
+        const page = await open(which, `#view=${view}`, { width, scheme });
+        assert.equal(await page.evaluate(() => document.documentElement.dataset.scheme), scheme);
+        assert.ok(
+          (await page.evaluate(() => document.documentElement.scrollWidth)) <= width,
+          "the page is wider than the window",
+        );
+        const cut = await page.$$eval(".plot svg.chart text", (list) =>
+          list
+            .filter((text) => {
+              const [own, host] = [text.getBoundingClientRect(), text.closest(".plot").getBoundingClientRect()];
+              return text.textContent && own.width && (own.left < host.left - 1 || own.right > host.right + 1);
+            })
+            .map((text) => text.textContent),
+        );
+        assert.deepEqual(cut, [], "labels beyond the edge of their figure");
+        assert.ok((await page.$eval("#view", (one) => one.textContent.length)) > 100);
+        leave(page);
+      });
+
+await check("the filters of a narrow window are a drawer", async () => {
+  const page = await load("reference", "#view=overview", { width: 390 });
+  const shown = () => page.$eval("#filters", (one) => getComputedStyle(one).display !== "none");
+  assert.equal(await shown(), false);
+  await page.click("#open-filters");
+  assert.equal(await shown(), true);
+  await page.click('input[name="scene"]');
+  assert.equal(await page.$eval("#open-filters", (button) => button.textContent), "Filters (1)");
+  await page.click(".close-filters");
+  assert.equal(await shown(), false);
+  assert.equal(await page.evaluate(() => document.activeElement.id), "open-filters");
+  await page.close();
+});
+
+await check("the switch changes the scheme", async () => {
+  const page = await load("reference", "", { scheme: "dark" });
+  const colour = () => page.evaluate(() => getComputedStyle(document.documentElement).backgroundColor);
+  const before = await colour();
+  await page.click("#theme");
+  assert.notEqual(await colour(), before);
+  await page.close();
+});
+
+// --- the report -------------------------------------------------------------------------------------------------
+
+/** Returns what reaches beyond the window without being in a part that scrolls. */
+const beyond = (page) =>
+  page.evaluate(() => {
+    const scrolls = (one) => one && (getComputedStyle(one).overflowX === "auto" || scrolls(one.parentElement));
+    return [...document.querySelectorAll("body *")]
+      .filter((one) => one.getBoundingClientRect().right > innerWidth + 1 && one.getBoundingClientRect().width && !scrolls(one))
+      .map((one) => one.outerHTML.slice(0, 80));
+  });
+
+for (const which of ["reference", "merged"])
+  for (const [width, scheme] of [
+    [1280, "light"],
+    [1280, "dark"],
+    [390, "light"],
+    [390, "dark"],
+  ])
+    await check(`the report of ${which} at ${width}, ${scheme}: short, nothing cut`, async () => {
+      assert.ok(statSync(expected[which].report).size < 2e6);
+      const page = await open(which, "", { width, scheme, file: "report" });
+      const tall = await page.evaluate(() => document.documentElement.scrollHeight);
+      if (width === 1280) assert.ok(tall <= 5 * 900, `${tall} pixels`);
+      assert.deepEqual(await beyond(page), []);
+      const contrast = await page.evaluate(() => getComputedStyle(document.documentElement).color);
+      assert.equal(contrast === "rgb(29, 33, 41)", scheme === "light");
+      await page.evaluate(() => document.querySelectorAll("details").forEach((one) => (one.open = true)));
+      assert.deepEqual(await beyond(page), [], "unfolded");
+      leave(page);
+    });
+
+await check("the report's top answers, and its links unfold what they lead to", async () => {
+  const page = await open("reference", "", { file: "report", width: 1280 });
+  assert.deepEqual(await page.$$eval(".sentences a", (list) => list.map((one) => one.textContent)), [
+    "What to take",
+    "Other questions",
+    "Time against error",
+    "The paper",
+    "This run",
+  ]);
+  const rule = expected.reference.situations.map(([, , , advice]) => [...new Set(advice.filter(Boolean).map(([id]) => id))].length);
+  assert.equal((await page.$$(".situation:not(.scale)")).length, rule.reduce((a, b) => a + b));
+  await page.click('.sentences a[href="#claims"]');
+  await page.waitForFunction(() => document.querySelector("#claims").open);
+  const claim = await load("reference", "#claim-E1", { file: "report" });
+  assert.equal(await claim.$eval("#claim-E1", (one) => one.open && one.closest("#claims").open), true);
+  await claim.close();
+  leave(page);
+});
+
+// --- speed ----------------------------------------------------------------------------------------------------
+
+await check("10 MB of results", async () => {
+  const { megabytes, runs } = expected.large;
+  assert.ok(megabytes > 10);
+  const page = await load("large");
+  const [shown, ready, filter] = await page.evaluate(async () => {
+    const first = [window.explorer.shown, window.explorer.ready];
+    const begun = performance.now();
+    window.explorer.set({ l: ["10"] });
+    await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+    return [...first, performance.now() - begun];
+  });
+  console.log(
+    `${megabytes.toFixed(1)} MB of results, ${runs} runs: shown ${shown.toFixed(0)} ms after the start of loading (its own work ${ready.toFixed(0)} ms), filtered in ${filter.toFixed(0)} ms`,
+  );
+  assert.equal(await page.evaluate(() => window.explorer.model.runs.length), runs);
+  assert.ok(shown < 20_000, "even a busy machine is faster");
+  await page.close();
+});
