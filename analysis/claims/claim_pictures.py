@@ -141,11 +141,12 @@ def grouped(criteria: Sequence[dict[str, Any]]) -> dict[str, list[dict[str, Any]
 
 
 def draw(blocks: Sequence[Block], unit: str = "") -> str:
-    """Draws the blocks one below the other on one axis; empty without values."""
+    """Draws the blocks one below the other on one axis; empty without values, and without any above 0: the axis is logarithmic."""
     values = [mark.value for block in blocks for bar in block.bars for mark in bar.marks]
-    if not values:
+    placed = [value for value in values if value > 0] + [one.bound for one in blocks if one.bound > 0]
+    if not values or not placed:
         return ""
-    axis = Axis([value for value in values if value > 0] + [one.bound for one in blocks if one.bound > 0], 0 in values)
+    axis = Axis(placed, 0 in values)
     parts: list[str] = []
     y = 2.0
     for block in blocks:

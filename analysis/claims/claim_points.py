@@ -30,6 +30,8 @@ COUNTED: dict[str, str] = {
     "looseness": "looseness",
     "false candidates": "false_candidates",
 }
+#: What is computed from several columns of a run (`Table.values`).
+DERIVED = ("values per event", "ageing")
 SLACK = 1.25  #: measured sizes reach a claimed one within this factor
 MEASURES = ("ratio", "value", "exponent", "next_l", "ten_l", "across")
 #: The names in a term, by column of a run.

@@ -15,6 +15,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Optional
 
+from claims import claim_file
 from claims.claim_points import SLACK, ClaimError, CheckResult, CheckEvaluator, Table
 from claims.claim_words import NOT_MEASURED, as_in_2006, brief, brief_theory, condition, rule, sentence, unmeasured
 from results import files, text
@@ -84,19 +85,22 @@ class Claims:
 
 
 def read_claims(file: Path = FILE) -> dict[str, Any]:
-    """Reads claims.json. Raises ClaimError."""
-    return read_json(file, SCHEMA, ClaimError)
+    """Reads and checks claims.json. Raises ClaimError."""
+    said = read_json(file, SCHEMA, ClaimError)
+    claim_file.check(said, str(file))
+    return said
 
 
 def evaluate(study: Study, folder: Path, file: Path = FILE) -> Claims:
     """Evaluates every claim, theory first. Raises ClaimError."""
     said = read_claims(file)
     looker = CheckEvaluator(Table(study, said["scalar"]), said["baselines"], said.get("squares", {}))
-    try:
-        rows = theory_rows(said["theory"], folder)
-        rows += [experiment_row(claim, looker) for claim in said["claims"]]
-    except KeyError as problem:
-        raise ClaimError(f"{file}: a claim has no {problem}") from None
+    rows = theory_rows(said["theory"], folder)
+    for claim in said["claims"]:
+        try:
+            rows.append(experiment_row(claim, looker))
+        except ClaimError as problem:
+            raise ClaimError(f"{file}: {claim['id']}: {problem}") from None
     return Claims(rows, said["baselines"])
 
 

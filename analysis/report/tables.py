@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Optional
+from typing import Callable, Optional, Union
 
 import pandas as pd
 
@@ -56,6 +56,48 @@ class Row:
     reference: bool
     wrong: bool
     faster: Optional[bool]
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of the table of results, after the contestant's name: in the page and in the terminal."""
+
+    name: str
+    meaning: str  #: in the page, over the name
+    cell: Callable[[Row], Union[str, Shown]]
+    words: bool = False  #: to the left; numbers stand to the right
+    errors: bool = False  #: anything but 0 is wrong
+    compared: bool = False  #: looks different where the contestant is faster than the best refit
+    in_page: bool = True
+
+    def css(self, row: Row) -> str:
+        """Returns the classes of a row's cell in the page."""
+        wrong = self.errors and self.cell(row) not in ("0", text.MISSING)
+        return " ".join(["n"] * (not self.words) + ["wrong"] * wrong + ["faster"] * bool(self.compared and row.faster))
+
+
+#: From left to right. RESULTS.md and the glossary at the end of the page say more about some.
+COLUMNS = (
+    Column("guarantee", "exact: its candidates are complete. superset: the candidates of a peer library are complete. approximate: pairs may "
+           "be wrong; missed and extra give their number.", lambda row: row.guarantee, words=True),
+    Column("code", "instruction set of the contestant's code: of kbvh's kernels, chosen at run time, or of a peer library",
+           lambda row: row.instructions, words=True),
+    Column("motion", "evaluating the positions of all vertices", lambda row: row.motion),
+    Column("update", "bringing the boxes up to date, plan changes included", lambda row: row.update),
+    Column("query", "traversal and triangle tests", lambda row: row.query),
+    Column("total", "motion, update and query", lambda row: row.total),
+    Column("ratio", "total time of the best refit over this total; above 1 is faster. In parentheses: 95 % interval; in brackets: range over "
+           "fewer than five repetitions", lambda row: row.ratio, compared=True),
+    Column("w/o motion", "the same ratio of update and query", lambda row: row.ratio_without_motion, in_page=False),
+    Column("steady", "ratio without motion, of the frames from the second knot on: nothing of the beginning", lambda row: row.steady),
+    Column("paid from", "the frame from which preparation and all frames so far take no longer than those of the best refit",
+           lambda row: row.paid_from),
+    Column("missed", "pairs of the oracle that were not reported, over all verified frames", lambda row: row.missed, errors=True),
+    Column("extra", "reported pairs that the oracle does not have", lambda row: row.extra, errors=True),
+    Column("protrusion", "largest distance of a vertex from a box that was read, in scene units", lambda row: row.protrusion, errors=True),
+    Column("looseness", "surface area of all boxes over that of tight ones, minus one", lambda row: row.looseness),
+    Column("memory", "of the strategy's own structures", lambda row: row.memory),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -223,22 +265,15 @@ def remarks(study: Study) -> list[str]:
     return [f"{row.title}: {row.remark}." for row in rows[["title", "remark"]].itertuples()]
 
 
-PLAIN_COLUMNS = ("strategy", "guarantee", "code", "motion", "update", "query", "total", "ratio", "w/o motion", "steady", "paid from", "missed",
-                 "extra", "protrusion", "looseness", "memory")  # fmt: skip
-
-
 def plain(scene: str, group: Group) -> str:
     """Formats a group as text for a terminal."""
-    cells = [PLAIN_COLUMNS] + [
-        (row.label, row.guarantee, row.instructions, row.motion, row.update, row.query, row.total, row.ratio, row.ratio_without_motion, row.steady, row.paid_from,
-         row.missed, row.extra, row.protrusion, row.looseness, row.memory)
-        for row in group.rows
-    ]  # fmt: skip
-    cells = [tuple(str(cell) for cell in row) for row in cells]
-    widths = [max(len(row[i]) for row in cells) for i in range(len(PLAIN_COLUMNS))]
+    cells = [["strategy", *(column.name for column in COLUMNS)]]
+    cells += [[row.label, *(str(column.cell(row)) for column in COLUMNS)] for row in group.rows]
+    words = [True, *(column.words for column in COLUMNS)]
+    widths = [max(map(len, column)) for column in zip(*cells)]
     lines = [f"{scene}: {group.title}; times in ms per frame, ratio to the best refit (above 1 is faster)"]
     for row in cells:
-        lines.append("  ".join(c.ljust(w) if i < 2 else c.rjust(w) for i, (c, w) in enumerate(zip(row, widths))).rstrip())
+        lines.append("  ".join(cell.ljust(width) if left else cell.rjust(width) for cell, width, left in zip(row, widths, words)).rstrip())
     lines += [f"  refused: {label}: {reason}" for _, label, reason in group.refused]
     spaces = str.maketrans("\u202f\u00a0\u2009", "   ")
     return "\n".join(lines).translate(spaces)

@@ -15,7 +15,7 @@ from typing import Any, Optional
 import paths  # noqa: F401  (finds the modules under test)
 import synthetic
 
-from report import report
+from report import report, tables
 
 
 def small() -> list[dict[str, Any]]:
@@ -136,6 +136,20 @@ class TestPage(ReportCase):
         self.assertEqual(rows, [f"tree_{i}" for i in range(10)] + ["tree_15"])
         self.assertIn("29 more are not in this table", page)
 
+    def test_columns_of_page_and_terminal_are_those_of_the_list(self) -> None:
+        page = self.page(small())
+        table = page[page.index('<table class="results">') : page.index("</table>", page.index('<table class="results">'))]
+        shown = [column for column in tables.COLUMNS if column.in_page]
+        self.assertEqual(re.findall(r"<abbr[^>]*>([^<]*)</abbr>", table), [column.name for column in shown])
+        rows = re.findall(r"<tr[^>]*><td>[^\n]*", table)
+        self.assertGreater(len(rows), 1)
+        for row in rows:
+            self.assertEqual(row.count("<td"), 1 + len(shown))
+        self.assertIn('<td class="n wrong">41</td>', table, "extra pairs")
+        self.assertIn('<td class="n wrong">3</td>', table, "missed pairs")
+        heading = next(line for line in self.run_report("--print")[1].splitlines() if line.startswith("strategy"))
+        self.assertEqual(re.split(r"\s{2,}", heading), ["strategy", *(column.name for column in tables.COLUMNS)])
+
     def test_results_are_never_written(self) -> None:
         synthetic.write(self.folder, small(), '{"schema": 1, "ki')
         before = (self.folder / "results.jsonl").read_bytes()
@@ -159,13 +173,18 @@ class TestShownValues(ReportCase):
         self.assertEqual(code, 0, err)
         return out
 
+    @staticmethod
+    def cells(printed: str, label: str) -> dict[str, str]:
+        """The cells of the first row whose name begins so, by the names of their columns."""
+        heading, *rows = (re.split(r"\s{2,}", line) for line in printed.splitlines() if "  " in line.strip())
+        return dict(zip(heading, next(row for row in rows if row[0].startswith(label))))
+
     def test_altered_time_flips_the_ratio(self) -> None:
         lines = [line for line in small() if line["scene"]["per_keyframe"] == 30]
         kinetic = next(line for line in lines if line["strategy"]["params"].get("queue") == "avl")
 
         def ratio(text: str) -> float:
-            row = next(row for row in text.splitlines() if row.startswith("Kinetic AABB tree (queue avl)"))
-            return float(re.split(r"\s{2,}", row)[7].split()[0])
+            return float(self.cells(text, "Kinetic AABB tree (queue avl)")["ratio"].split()[0])
 
         self.assertLess(ratio(self.table(lines)), 1)
         for repetition in kinetic["times"]["repetitions"]:
@@ -194,12 +213,12 @@ class TestShownValues(ReportCase):
         self.assertRegex(self.table(lines), r"Bottom-up refit \(leaf 1, width 2\) +exact .* 1\.00 +1\.00")
 
     def test_missed_and_extra_are_shown(self) -> None:
-        row = next(r for r in self.table(small()).splitlines() if r.startswith("FCL with its own"))
-        self.assertEqual(re.split(r"\s{2,}", row)[11:13], ["3", "41"])
+        found = self.cells(self.table(small()), "FCL with its own")
+        self.assertEqual([found[name] for name in ("missed", "extra")], ["3", "41"])
 
     def test_looseness_of_hidden_boxes_is_unknown(self) -> None:
-        row = next(r for r in self.table(small()).splitlines() if r.startswith("FCL with its own"))
-        self.assertEqual(re.split(r"\s{2,}", row)[13:15], ["–", "–"])
+        found = self.cells(self.table(small()), "FCL with its own")
+        self.assertEqual([found[name] for name in ("protrusion", "looseness")], ["–", "–"])
 
 
 class TestLimits(ReportCase):

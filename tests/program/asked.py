@@ -129,7 +129,8 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="kbvh-asked-") as folder:
         asker = Asker(sys.argv[1], Path(folder))
         options = set(re.findall(r"^ +(?:-\w,)?(--[\w-]+)", asker.run(f"'{sys.argv[1]}' run --help", "help"), flags=re.M))
-        require(options == COVERED | OTHERS, f"options that no question covers, or that are gone: {options ^ (COVERED | OTHERS)}")
+        require(options == COVERED | OTHERS, f"options that no question covers, or that are gone: {options ^ (COVERED | OTHERS)}. "
+                "One that says what is measured belongs to COVERED, with a question in ASKED; any other to OTHERS.")
         owner: dict[str, str] = {}
         for what, asked in ASKED.items():
             keys, jobs = asker.lead_back(what, {**PLAIN, **asked})

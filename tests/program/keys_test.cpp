@@ -5,7 +5,9 @@
 #include <cmath>
 #include <functional>
 #include <set>
+#include <sstream>
 
+#include "complaint.hpp"
 #include "experiments/common/json_reader.hpp"
 #include "experiments/io/obj.hpp"
 #include "experiments/io/pc2.hpp"
@@ -122,30 +124,60 @@ TEST(Keys, SeeEveryFieldOfAScriptedScene) {
                              {"oracle_every", 1}});
 }
 
-TEST(Keys, SeeEveryFieldOfAPlan) {
-  expect_every_field_counts(
-      {{"name", "n"},
-       {"description", "d"},
-       {"scenes", json::parse(R"([{"builtin": "random_soups", "triangles": 50, "obstacle": 40,
+/// Plans that together have every key of a study that can be altered to another of its kind.
+std::vector<json> plans_of_every_key() {
+  std::vector<json> plans;
+  plans.push_back({{"name", "n"},
+                   {"description", "d"},
+                   {"scenes", json::parse(R"([{"builtin": "random_soups", "triangles": 50, "obstacle": 40,
                                  "keyframes": 3, "seed": 7, "order": "shuffled", "self": false}])")},
-       {"strategies", strategies},
-       {"l", {3}},
-       {"scalars", {"float"}},
-       {"repetitions", 2},
-       {"interval_width", 0.25},
-       {"seconds", 2.0},
-       {"frames_limit", 3},
-       {"oracle_every", 1},
-       {"continuous", false}});
-  expect_every_field_counts({{"scenes", json::parse(R"([{"builtin": "random_soups", "triangles": 50,
+                   {"strategies", strategies},
+                   {"l", {3}},
+                   {"scalars", {"float"}},
+                   {"repetitions", 2},
+                   {"interval_width", 0.25},
+                   {"seconds", 2.0},
+                   {"frames_limit", 3},
+                   {"oracle_every", 1},
+                   {"continuous", false}});
+  plans.push_back({{"scenes", json::parse(R"([{"builtin": "random_soups", "triangles": 50,
                                  "obstacle": 40, "keyframes": 3}])")},
-                             {"strategies", strategies},
-                             {"changes", "pairs"},
-                             {"l", {3}},
-                             {"scalars", {"float"}}});
-  expect_every_field_counts({{"scenes", json::parse(R"([{"builtin": "reversing_spheres", "triangles": 80,
+                   {"strategies", strategies},
+                   {"changes", "pairs"},
+                   {"l", {3}},
+                   {"scalars", {"float"}}});
+  plans.push_back({{"scenes", json::parse(R"([{"builtin": "reversing_spheres", "triangles": 80,
                                  "obstacle": 80, "keyframes": 6}])")},
-                             {"strategies", strategies}});
+                   {"strategies", strategies}});
+  return plans;
+}
+
+TEST(Keys, SeeEveryFieldOfAPlan) {
+  for (const json& plan : plans_of_every_key()) expect_every_field_counts(plan);
+}
+
+// A new key of plans does not stay out of these tests, nor perhaps out of the keys of results, unnoticed.
+TEST(Keys, AreTestedWithEveryKeyThatAPlanMayHave) {
+  const std::string told = complaint([] { read_plan({{"no such key", 1}}, "p.json", {}); });
+  const std::string before = "known are ";
+  std::size_t begin = told.find(before);
+  ASSERT_NE(begin, std::string::npos) << told;
+  begin += before.size();
+  const std::set<std::string> elsewhere{
+      "studies", "targets",            // these do not belong to a configuration
+      "params",  "builder",            // in `strategies`; SeeEveryParameterOfEveryStrategy
+      "rays",    "within",  "kernels"  // tests/program/asked.py
+  };
+  std::set<std::string> altered;
+  for (const json& plan : plans_of_every_key())
+    for (const auto& [key, value] : plan.items()) altered.insert(key);
+  std::istringstream known(told.substr(begin, told.find(';', begin) - begin));
+  std::size_t count = 0;
+  for (std::string key; std::getline(known >> std::ws, key, ','); ++count)
+    EXPECT_TRUE(altered.count(key) + elsewhere.count(key) == 1)
+        << "the key '" << key << "' of plans: add it to plans_of_every_key; configuration_key "
+        << "(experiments/results/record.cpp) must contain it if it affects results";
+  EXPECT_GT(count, 15u) << told;
 }
 
 TEST(Keys, SeeHowAFileIsPlayed) {
