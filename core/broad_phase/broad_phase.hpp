@@ -9,10 +9,11 @@
 
 #include "core/broad_phase/changes.hpp"
 #include "core/broad_phase/earliest_impact.hpp"
+#include "core/broad_phase/element_search.hpp"
 #include "core/broad_phase/element_tree.hpp"
 #include "core/broad_phase/elements.hpp"
 #include "core/broad_phase/pair_filter.hpp"
-#include "core/families/wide/kernels/wide_overlap.hpp"
+#include "core/broad_phase/self_intersections.hpp"
 #include "core/kernels/kernel_set.hpp"
 
 namespace kbvh {
@@ -108,6 +109,13 @@ class BroadPhase {
   /// Excludes pairs of one kind, in place of those excluded before. Throws std::invalid_argument for an id
   /// that does not exist.
   void exclude(CandidateKind kind, std::span<const Candidate> pairs);
+  /// Excludes pairs of elements, of all kinds, that at most `rings` edges connect: where a way of so many edges
+  /// leads from a vertex of one element to a vertex of the other. Edges are those of E and the sides of faces;
+  /// removed ones do not count. 0: incident elements only, which never are candidates. The next search lists
+  /// the vertices within so many edges of each vertex (about 1 + 3 k + 3 k^2 for k rings of a triangulation),
+  /// and does so again after elements were inserted or removed; it throws std::length_error for 2^32 of them or
+  /// more.
+  void exclude_rings(std::uint32_t rings);
   /// Lets a function choose among the pairs that no other filter excludes, many at a time: see PairFunction.
   /// It has to give the same answer whenever it is asked about a pair. Exceptions that it throws end the
   /// search and pass to the caller. An empty function ends this.
@@ -153,6 +161,14 @@ class BroadPhase {
   /// Returns the same of the pairs within a distance, which may be another one at each call. These changes
   /// and those of candidates do not affect each other. Throws as `within` does.
   CandidateChanges changes_within(CandidateKind kind, double distance);
+
+  /// Finds all self intersections of the faces: the pairs of faces, without a common vertex, that have a common
+  /// point, exactly as within(face_face, 0) finds them. Of a motion, at its end. Candidates are not kept, and
+  /// answers are in another order. With `cones`, the search leaves out patches that are proved not to touch
+  /// themselves (PatchCertificate): a smooth mesh has few others. After a build of the faces' tree, the first
+  /// call with cones lists contours, which takes about as long as the build.
+  void self_intersections(CandidateBuffer& out, SelfCulling culling = SelfCulling::cones,
+                          SelfIntersectionStats* stats = nullptr);
 
   /// Finds the first time during the motion from V0 to V1 at which the distance of a vertex and a face, or of
   /// two edges, is at most the separation; 0: the first contact. Verdicts are exact, in real arithmetic on
@@ -209,11 +225,17 @@ class BroadPhase {
   InsertedElements add(const MatrixView<S>& v, const Primitives& edges, const Primitives& faces);
   void add_vertices(const MatrixView<S>& v);
   void groups_changed();
+  /// Takes other connections of vertices: with rings, pairs of all kinds may begin or end.
+  void connections_changed();
   ElementTree<S>& current_tree(Element element);
+  /// Returns a search of current trees from their roots; without starts if their boxes do not meet.
+  ElementSearchJob<S> search_job(CandidateKind kind);
   void search(CandidateKind kind, CandidateBuffer& out);
-  void take_leaf_pairs(CandidateKind kind, const ElementLeaves<S>& a, const ElementLeaves<S>& b,
-                       std::size_t count, CandidateBuffer& out);
   const CandidateBuffer& kept(CandidateKind kind);
+  /// Returns the present positions, [vertex][4]: of a motion, its end.
+  const S* present_points() const {
+    return motion_ == Motion::straight ? end_points_.data() : points_.data();
+  }
 
   BroadPhaseSettings settings_;
   KernelSet kernels_;
@@ -232,9 +254,9 @@ class BroadPhase {
   PairFilter filter_;
   std::array<ChangeTracker, 6> candidate_changes_, near_changes_;
   CandidateBuffer near_;
-  // For temporary use by searches.
-  std::vector<WidePair> stack_;
-  std::vector<LeafSlot> leaf_pairs_;
+  ElementSearch<S> search_;
+  PatchCulling<S> patches_;
+  FaceTests<S> face_tests_;
   std::uint64_t detections_ = 0, references_ = 0, last_box_tests_ = 0;
 };
 
