@@ -9,7 +9,7 @@ namespace {
 constexpr std::uint32_t unconnected = 1000;
 
 /// The number of edges between each two vertices, by definition: every way through every vertex.
-std::vector<std::vector<std::uint32_t>> all_distances(const Elements& elements) {
+std::vector<std::vector<std::uint32_t>> all_ways(const Elements& elements) {
   const std::uint32_t count = elements.vertex_count();
   std::vector<std::vector<std::uint32_t>> away(count, std::vector<std::uint32_t>(count, unconnected));
   for (std::uint32_t v = 0; v < count; ++v) away[v][v] = 0;
@@ -28,7 +28,7 @@ std::vector<std::vector<std::uint32_t>> all_distances(const Elements& elements) 
 template <class S>
 std::string wrong_candidates(BroadPhase<S>& broad, const Mesh<S>& mesh, S radius, std::uint32_t rings) {
   const Elements& elements = broad.elements();
-  const auto away = all_distances(elements);
+  const auto away = all_ways(elements);
   const std::vector<Box<S>> boxes = vertex_boxes(mesh, radius);
   for (const CandidateKind kind : candidate_kinds) {
     Pairs expected = brute_force(elements, kind, boxes);
