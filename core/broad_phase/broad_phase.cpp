@@ -57,6 +57,7 @@ void BroadPhase<S>::start(const MatrixView<S>& v0, const MatrixView<S>& v1, Elem
     trees_[kind].start(elements_->lists[kind], settings_.leaf_size, kernels_);
   detections_ = references_ = 0;
   filter_.clear();
+  patch_members_.forget_sides();
   for (std::size_t kind = 0; kind < candidate_kinds.size(); ++kind) {
     candidate_changes_[kind].clear();
     near_changes_[kind].clear();
@@ -296,6 +297,7 @@ void BroadPhase<S>::remove(Element element, std::span<const std::uint32_t> ids) 
 
 template <class S>
 void BroadPhase<S>::connections_changed() {
+  patch_members_.forget_sides();
   if (filter_.rings() == 0) return;
   filter_.connections_changed();
   forget_found();
@@ -447,26 +449,11 @@ CandidateChanges BroadPhase<S>::changes_within(CandidateKind kind, double distan
 }
 
 template <class S>
-EarliestImpact BroadPhase<S>::earliest_impact(double separation, EarliestImpactStats* stats) {
-  elements();
-  if (motion_ != Motion::straight)
-    throw std::logic_error("an impact is asked for without a motion from V0 to V1");
-  if (!(separation >= 0 && separation <= double(radius_)))
-    throw std::invalid_argument("earliest_impact() takes a separation from 0 to the radius " +
-                                number_text(double(radius_)) + ", not " + number_text(separation));
-  EarliestImpact earliest;
-  for (const CandidateKind kind : {CandidateKind::face_vertex, CandidateKind::edge_edge})
-    take_earlier_impacts<S>(kind, *elements_, points_.data(), end_points_.data(), span_of(kept(kind)),
-                            separation, earliest, stats);
-  return earliest;
-}
-
-template <class S>
 std::size_t BroadPhase<S>::bytes() const {
   std::size_t total = (points_.capacity() + end_points_.capacity() + boxes_.capacity() +
                        displacements_.capacity() + grown_each_.capacity()) *
                           sizeof(S) +
-                      search_.bytes() + patches_.bytes() + face_tests_.bytes();
+                      search_.bytes() + patches_.bytes() + patch_members_.bytes() + face_tests_.bytes();
   for (const ElementTree<S>& tree : trees_) total += tree.bytes();
   for (const CandidateBuffer& found : found_) total += found.capacity() * sizeof(Candidate);
   for (const auto* const trackers : {&candidate_changes_, &near_changes_})

@@ -175,8 +175,11 @@ class BroadPhase {
   /// the given numbers, no epsilon (core/continuous/impact.hpp; core/broad_phase/approach.hpp), and the time
   /// is enclosed. A distance that is reached at a single instant counts, and so does t = 0. Incident elements
   /// do not count, nor do pairs that a filter excludes. Throws std::logic_error unless the last positions
-  /// were a motion, and std::invalid_argument unless 0 <= separation <= radius.
-  EarliestImpact earliest_impact(double separation = 0, EarliestImpactStats* stats = nullptr);
+  /// were a motion, and std::invalid_argument unless 0 <= separation <= radius. With `cones`, contacts are not
+  /// looked for within patches that are proved not to touch themselves during the whole motion; with a
+  /// separation, cones change nothing.
+  EarliestImpact earliest_impact(double separation = 0, EarliestImpactStats* stats = nullptr,
+                                 SelfCulling culling = SelfCulling::cones);
 
   /// From now on candidates hold for all positions in which no coordinate of a vertex differs by more than
   /// `displacement` from its value at the last detection: updates within that bound cost a comparison and
@@ -227,6 +230,8 @@ class BroadPhase {
   void groups_changed();
   /// Takes other connections of vertices: with rings, pairs of all kinds may begin or end.
   void connections_changed();
+  /// Returns the members of the patches that do not touch themselves during the motion.
+  const PatchMembers& certified_patches();
   ElementTree<S>& current_tree(Element element);
   /// Returns a search of current trees from their roots; without starts if their boxes do not meet.
   ElementSearchJob<S> search_job(CandidateKind kind);
@@ -256,6 +261,7 @@ class BroadPhase {
   CandidateBuffer near_;
   ElementSearch<S> search_;
   PatchCulling<S> patches_;
+  PatchMembers patch_members_;
   FaceTests<S> face_tests_;
   std::uint64_t detections_ = 0, references_ = 0, last_box_tests_ = 0;
 };

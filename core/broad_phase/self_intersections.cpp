@@ -1,9 +1,11 @@
-// The members of BroadPhase that find self intersections.
+// The members of BroadPhase that find self intersections and impacts.
 #include "core/broad_phase/self_intersections.hpp"
 
 #include <algorithm>
+#include <stdexcept>
 
 #include "core/broad_phase/broad_phase.hpp"
+#include "core/broad_phase/checked_input.hpp"
 
 namespace kbvh {
 
@@ -69,9 +71,48 @@ void BroadPhase<S>::self_intersections(CandidateBuffer& out, SelfCulling culling
   stats->triangles.exact += counts.triangles.exact;
 }
 
+template <class S>
+const PatchMembers& BroadPhase<S>::certified_patches() {
+  ElementTree<S>& tree = current_tree(Element::face);
+  if (tree.empty()) {
+    patch_members_.mark(*elements_, ElementLeaves<S>{}, 0, {});
+    return patch_members_;
+  }
+  const ElementLeaves<S> faces = tree.leaves();
+  patches_.run(faces, tree.padded_leaf_size(), tree.contours(elements_->vertex_count()), points_.data(),
+               end_points_.data());
+  patch_members_.mark(*elements_, faces, tree.padded_leaf_size(), patches_.certified());
+  return patch_members_;
+}
+
+template <class S>
+EarliestImpact BroadPhase<S>::earliest_impact(double separation, EarliestImpactStats* stats,
+                                              SelfCulling culling) {
+  elements();
+  if (motion_ != Motion::straight)
+    throw std::logic_error("an impact is asked for without a motion from V0 to V1");
+  if (!(separation >= 0 && separation <= double(radius_)))
+    throw std::invalid_argument("earliest_impact() takes a separation from 0 to the radius " +
+                                number_text(double(radius_)) + ", not " + number_text(separation));
+  constexpr CandidateKind kinds[] = {CandidateKind::face_vertex, CandidateKind::edge_edge};
+  std::size_t candidates = 0;
+  for (const CandidateKind kind : kinds) candidates += kept(kind).size();
+  // Few candidates are tested in less time than all faces.
+  const bool cull =
+      culling == SelfCulling::cones && separation == 0 && candidates > elements_->count(Element::face);
+  const PatchMembers* const patches = cull ? &certified_patches() : nullptr;
+  EarliestImpact earliest;
+  for (const CandidateKind kind : kinds)
+    take_earlier_impacts<S>(kind, *elements_, points_.data(), end_points_.data(), span_of(kept(kind)),
+                            separation, earliest, stats, patches);
+  return earliest;
+}
+
 template class FaceTests<float>;
 template class FaceTests<double>;
 template void BroadPhase<float>::self_intersections(CandidateBuffer&, SelfCulling, SelfIntersectionStats*);
 template void BroadPhase<double>::self_intersections(CandidateBuffer&, SelfCulling, SelfIntersectionStats*);
+template EarliestImpact BroadPhase<float>::earliest_impact(double, EarliestImpactStats*, SelfCulling);
+template EarliestImpact BroadPhase<double>::earliest_impact(double, EarliestImpactStats*, SelfCulling);
 
 }  // namespace kbvh

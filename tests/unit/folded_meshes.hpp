@@ -165,4 +165,34 @@ Mesh<S> double_disc(std::uint32_t spokes, std::uint32_t rings) {
   return mesh;
 }
 
+/// The tree over the faces of a mesh, its contours, and certificates at the mesh's positions or for its motion.
+template <class S>
+struct Patches {
+  Elements elements;
+  ElementTree<S> tree;
+  UnfilledArray<S> begin, end;  ///< [vertex][4]
+  PatchCertificate<S> certificate;
+
+  explicit Patches(const Mesh<S>& mesh) : elements(mesh.elements()) {
+    UnfilledArray<S> boxes;
+    for (const Box<S>& box : vertex_boxes(mesh, S(0))) {
+      boxes.insert(boxes.end(), {box.lower[0], box.lower[1], box.lower[2], S(0)});
+      boxes.insert(boxes.end(), {box.upper[0], box.upper[1], box.upper[2], S(0)});
+    }
+    const auto points = [](const std::vector<S>& v, UnfilledArray<S>& to) {
+      for (std::size_t i = 0; i < v.size(); i += 3) to.insert(to.end(), {v[i], v[i + 1], v[i + 2], S(0)});
+    };
+    points(mesh.v0, begin);
+    points(mesh.v1, end);
+    tree.start(elements.of(Element::face), 5, KernelSet::portable);
+    tree.refresh(boxes.data(), 2);
+    certificate.take(begin.data(), end.empty() ? nullptr : end.data());
+  }
+  const FaceContours& contours() { return tree.contours(elements.vertex_count()); }
+  std::span<const FaceSide> contour(std::uint32_t node) { return contours().of(node); }
+  bool normals_agree(std::uint32_t node, const typename PatchCertificate<S>::Axis& axis) {
+    return certificate.normals_agree(tree.leaves(), tree.padded_leaf_size(), node, axis);
+  }
+};
+
 }  // namespace kbvh::test::broad_phase

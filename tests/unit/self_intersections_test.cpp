@@ -218,33 +218,6 @@ TYPED_TEST(SelfIntersections, FollowUpdatesEditsAndFilters) {
 
 // ---- Seeded faults: what these tests compare with finds them ----------------------------------------------
 
-/// The tree, contours and certificates of a mesh.
-template <class S>
-struct Patches {
-  Elements elements;
-  ElementTree<S> tree;
-  UnfilledArray<S> points;
-  PatchCertificate<S> certificate;
-
-  explicit Patches(const Mesh<S>& mesh) : elements(mesh.elements()) {
-    UnfilledArray<S> boxes;
-    for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
-      for (int side = 0; side < 2; ++side)
-        boxes.insert(boxes.end(), {mesh.v0[3 * v], mesh.v0[3 * v + 1], mesh.v0[3 * v + 2], S(0)});
-      points.insert(points.end(), boxes.end() - 4, boxes.end());
-    }
-    tree.start(elements.of(Element::face), 5, KernelSet::portable);
-    tree.refresh(boxes.data(), 2);
-    certificate.take(points.data(), nullptr);
-  }
-  std::span<const FaceSide> contour(std::uint32_t node) {
-    return tree.contours(elements.vertex_count()).of(node);
-  }
-  bool normals_agree(std::uint32_t node, const typename PatchCertificate<S>::Axis& axis) {
-    return certificate.normals_agree(tree.leaves(), tree.padded_leaf_size(), node, axis);
-  }
-};
-
 /// Normals alone would certify a ramp whose storeys cut each other, and a disc that covers itself.
 TYPED_TEST(SelfIntersections, AnOmittedContourTestIsCaught) {
   using S = TypeParam;
