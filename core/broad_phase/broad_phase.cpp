@@ -21,7 +21,10 @@ StridedPoints<S> strided(const MatrixView<S>& v) {
 
 template <class S>
 BroadPhase<S>::BroadPhase(const BroadPhaseSettings& settings)
-    : settings_(settings), kernels_(settings.kernels.value_or(active_kernel_set())) {
+    : settings_(settings),
+      kernels_(settings.kernels.value_or(active_kernel_set())),
+      workers_(settings.threads),
+      face_tests_(settings.threads) {
   if (settings.leaf_size < 5 || settings.leaf_size > 16)
     throw std::invalid_argument("leaf size must be 5 to 16, got " + std::to_string(settings.leaf_size));
   if (!(settings.most_growth >= 1))
@@ -395,7 +398,7 @@ void BroadPhase<S>::search(CandidateKind kind, CandidateBuffer& out) {
   const ElementSearchJob<S> job = search_job(kind);
   if (job.starts.empty()) return;
   const bool filtered = filter_.looks_at(kind);
-  last_box_tests_ = 1 + search_.run(job, out, [&](Candidate* pairs, std::size_t count) {
+  last_box_tests_ = 1 + run_search(job, out, [&](Candidate* pairs, std::size_t count, std::uint32_t) {
     return filtered ? filter_.keep(*elements_, kind, {pairs, count}) : count;
   });
 }
@@ -453,7 +456,8 @@ std::size_t BroadPhase<S>::bytes() const {
   std::size_t total = (points_.capacity() + end_points_.capacity() + boxes_.capacity() +
                        displacements_.capacity() + grown_each_.capacity()) *
                           sizeof(S) +
-                      search_.bytes() + patches_.bytes() + patch_members_.bytes() + face_tests_.bytes();
+                      search_.bytes() + patches_.bytes() + patch_members_.bytes();
+  for (const FaceTests<S>& tests : face_tests_) total += tests.bytes();
   for (const ElementTree<S>& tree : trees_) total += tree.bytes();
   for (const CandidateBuffer& found : found_) total += found.capacity() * sizeof(Candidate);
   for (const auto* const trackers : {&candidate_changes_, &near_changes_})

@@ -23,6 +23,9 @@ struct BroadPhaseSettings {
   std::uint32_t leaf_size = 16;
   /// A tree is built again where its nodes' surface has grown beyond this factor since it was built.
   double most_growth = 2;
+  /// Threads that share searches and tests of self intersections. Answers and their order do not depend on
+  /// it. At most most_threads() (core/parallel/workers.hpp).
+  std::uint32_t threads = 1;
   /// The instruction set; nothing: the widest that this processor supports. All compute the same bits.
   std::optional<KernelSet> kernels{};
 };
@@ -45,11 +48,12 @@ struct InsertedElements {
 /// the caller's memory, any strides (matrices and maps of Eigen convert), and are read during the call only.
 /// Every call that takes positions throws std::invalid_argument, and changes nothing, for another number of
 /// rows or columns and for an inadmissible coordinate, which it names. Once warm, nothing allocates except
-/// lists that become longer than ever before. One thread at a time.
+/// lists that become longer than ever before. One caller's thread at a time; filters of a caller are called on
+/// it.
 template <class S>
 class BroadPhase {
  public:
-  /// Throws std::invalid_argument for a leaf size or a growth out of range.
+  /// Throws std::invalid_argument for a leaf size, a growth or a number of threads out of range.
   explicit BroadPhase(const BroadPhaseSettings& settings = {});
   ~BroadPhase();
   BroadPhase(const BroadPhase&) = delete;
@@ -236,6 +240,14 @@ class BroadPhase {
   /// Returns a search of current trees from their roots; without starts if their boxes do not meet.
   ElementSearchJob<S> search_job(CandidateKind kind);
   void search(CandidateKind kind, CandidateBuffer& out);
+  /// Searches on all threads, or on the caller's alone if a function of the caller or the size of the mesh asks
+  /// for that. Returns the number of box tests.
+  template <class Sift>
+  std::uint64_t run_search(const ElementSearchJob<S>& job, CandidateBuffer& out, const Sift& sift) {
+    const bool alone = filter_.has_function() || job.usual < 4 * few_elements;
+    return alone ? search_.run_alone(job, out, sift) : search_.run(workers_, job, out, sift);
+  }
+  static constexpr std::size_t few_elements = 4096;
   const CandidateBuffer& kept(CandidateKind kind);
   /// Returns the present positions, [vertex][4]: of a motion, its end.
   const S* present_points() const {
@@ -259,10 +271,11 @@ class BroadPhase {
   PairFilter filter_;
   std::array<ChangeTracker, 6> candidate_changes_, near_changes_;
   CandidateBuffer near_;
+  Workers workers_;
   ElementSearch<S> search_;
   PatchCulling<S> patches_;
   PatchMembers patch_members_;
-  FaceTests<S> face_tests_;
+  std::vector<FaceTests<S>> face_tests_;  // [runner]
   std::uint64_t detections_ = 0, references_ = 0, last_box_tests_ = 0;
 };
 

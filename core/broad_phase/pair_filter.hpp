@@ -69,6 +69,9 @@ class PairFilter {
   /// Takes further elements: with the default groups, or the union of their vertices'.
   void elements_inserted(const Elements& elements);
 
+  /// Returns whether there is a function of the caller, which only the caller's thread may call. All other
+  /// filters allow calls of `keep` by several threads.
+  bool has_function() const { return bool(function_); }
   /// Sets the caller's function; an empty one ends it.
   void set_function(PairFunction function) { function_ = std::move(function); }
 

@@ -11,7 +11,7 @@ namespace kbvh {
 
 template <class S>
 std::size_t FaceTests<S>::keep(const std::uint32_t* corners, const S* points, Candidate* pairs,
-                               std::size_t count, KernelSet kernels, TriangleTestStats& stats) {
+                               std::size_t count, KernelSet kernels) {
   constexpr std::size_t at_once = 1024;
   triangles_.resize(at_once);
   touch_.resize(at_once);
@@ -24,13 +24,21 @@ std::size_t FaceTests<S>::keep(const std::uint32_t* corners, const S* points, Ca
         triangles_[i].corner[c] = points + std::size_t(4) * corners[std::size_t(3) * pair.first + c];
         triangles_[i].corner[3 + c] = points + std::size_t(4) * corners[std::size_t(3) * pair.second + c];
       }
-    triangles_intersect<S>({triangles_.data(), here}, touch_.data(), stats, kernels);
+    triangles_intersect<S>({triangles_.data(), here}, touch_.data(), stats_, kernels);
     for (std::size_t i = 0; i < here; ++i) {
       pairs[kept] = pairs[begin + i];
       kept += touch_[i];
     }
   }
   return kept;
+}
+
+template <class S>
+void FaceTests<S>::take_stats(TriangleTestStats& stats) {
+  stats.tests += stats_.tests;
+  stats.filtered += stats_.filtered;
+  stats.exact += stats_.exact;
+  stats_ = {};
 }
 
 template <class S>
@@ -54,13 +62,14 @@ void BroadPhase<S>::self_intersections(CandidateBuffer& out, SelfCulling culling
     counts.certified = patches_.certified().size();
     counts.box_tests += patches_.box_tests();
   }
-  job.usual = 4096;  // sifted at once
   const std::uint32_t* const corners = elements_->of(Element::face).vertices.data();
   const bool filtered = filter_.looks_at(kind);
-  counts.box_tests += search_.run(job, out, [&](Candidate* pairs, std::size_t count) {
+  const auto sift = [&](Candidate* pairs, std::size_t count, std::uint32_t runner) {
     if (filtered) count = filter_.keep(*elements_, kind, {pairs, count});
-    return face_tests_.keep(corners, present_points(), pairs, count, kernels_, counts.triangles);
-  });
+    return face_tests_[runner].keep(corners, present_points(), pairs, count, kernels_);
+  };
+  counts.box_tests += run_search(job, out, sift);
+  for (FaceTests<S>& tests : face_tests_) tests.take_stats(counts.triangles);
   last_box_tests_ = counts.box_tests;
   if (stats == nullptr) return;
   stats->patches += counts.patches;

@@ -4,6 +4,7 @@
 
 #include "core/broad_phase/patch_culling.hpp"
 #include "core/geometry/triangle_batch.hpp"
+#include "core/parallel/workers.hpp"
 
 namespace kbvh {
 
@@ -21,17 +22,20 @@ struct SelfIntersectionStats {
   TriangleTestStats triangles{};  ///< tests: pairs of faces with overlapping boxes and without a common vertex
 };
 
-/// Exact tests of pairs of faces, many at a time. Keeps its memory.
+/// Exact tests of pairs of faces, many at a time, by one thread. Keeps its memory.
 template <class S>
-class FaceTests {
+class alignas(cache_line) FaceTests {
  public:
   /// Moves the pairs of faces that have a common point to the front, and returns their number. `corners` is
   /// [face][3], `points` [vertex][4].
   std::size_t keep(const std::uint32_t* corners, const S* points, Candidate* pairs, std::size_t count,
-                   KernelSet kernels, TriangleTestStats& stats);
+                   KernelSet kernels);
+  /// Adds the counts since the last call to `stats`.
+  void take_stats(TriangleTestStats& stats);
   std::size_t bytes() const { return triangles_.capacity() * sizeof(TrianglePair<S>) + touch_.capacity(); }
 
  private:
+  TriangleTestStats stats_;
   std::vector<TrianglePair<S>> triangles_;
   std::vector<std::uint8_t> touch_;
 };
