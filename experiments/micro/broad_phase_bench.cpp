@@ -1,6 +1,7 @@
 // The time of kbvh::broad_phase relative to other ways to the same pairs, in one run and by turns: swept
 // vertex-face and edge-edge candidates between two frames from scratch and with a known tree, iterates within
-// a bound, updates of few vertices, and candidates between groups. Prints medians of processor time in ms and
+// a bound, updates of few vertices, candidates between groups, and self intersections of cloth with cones and
+// without. Prints medians of processor time in ms and
 // ratios, and compares them with targets; FILE receives all times, ratios and targets.
 //   kbvh_broad_phase_bench [FRAMES] [REPETITIONS] [FILE]
 // FRAMES is a folder with a pair of frames (default: cloth-ball of the data folder).
@@ -8,14 +9,9 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <ctime>
+#include <exception>
 #include <filesystem>
-#include <fstream>
-#include <functional>
-#include <map>
-#include <nlohmann/json.hpp>
 #include <numeric>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -23,113 +19,12 @@
 #include "core/families/sweep/sorted_boxes.hpp"
 #include "core/judge/session.hpp"
 #include "experiments/common/environment.hpp"
-#include "experiments/common/machine.hpp"
+#include "experiments/micro/turns_table.hpp"
 #include "experiments/study/box_candidates.hpp"
 #include "experiments/study/contestants.hpp"
 
 namespace kbvh::experiments {
 namespace {
-
-/// The processor's time of this program, which has one thread: other programs disturb it least.
-double milliseconds() {
-  return 1e3 * double(std::clock()) / CLOCKS_PER_SEC;
-}
-
-/// Work that is timed by turns with its rivals.
-struct Contestant {
-  std::string name;
-  std::function<std::size_t()> work;  ///< returns the number of pairs
-  std::vector<double> ms{};
-  std::size_t pairs = 0;
-};
-
-/// What was compared in this run, for the file and for targets.
-class Table {
- public:
-  /// Plays all contestants once without a clock, then by turns, and prints medians and how many times as long
-  /// as the first each one takes.
-  void compare(const std::string& title, std::vector<Contestant> contestants, int repetitions) {
-    for (int r = -1; r < repetitions; ++r)
-      for (Contestant& contestant : contestants) {
-        const double begin = milliseconds();
-        contestant.pairs = contestant.work();
-        const double took = milliseconds() - begin;
-        if (r >= 0) contestant.ms.push_back(took);
-      }
-    std::printf("%s\n", title.c_str());
-    nlohmann::json rows = nlohmann::json::array();
-    double first = 0;
-    for (Contestant& contestant : contestants) {
-      std::sort(contestant.ms.begin(), contestant.ms.end());
-      const double median = contestant.ms[contestant.ms.size() / 2];
-      if (first == 0) first = median;
-      medians_[contestant.name] = median;
-      std::printf("  %-56s %10.3f ms  %7.2f x  %zu pairs\n", contestant.name.c_str(), median, median / first,
-                  contestant.pairs);
-      rows.push_back({{"name", contestant.name},
-                      {"median_ms", median},
-                      {"ms", contestant.ms},
-                      {"over_first", median / first},
-                      {"pairs", contestant.pairs}});
-    }
-    comparisons_.push_back({{"title", title}, {"contestants", rows}});
-  }
-
-  /// Compares how many times as long as `ours` the rival takes with what is at least asked for, and with the
-  /// aim; 0: none is. Does nothing if one of them was not measured.
-  void target(const char* what, const std::string& ours, const std::string& rival, double at_least,
-              double aim) {
-    if (!medians_.contains(ours) || !medians_.contains(rival)) return;
-    const double ratio = medians_.at(rival) / medians_.at(ours);
-    const char* const verdict = at_least == 0      ? "reported"
-                                : ratio < at_least ? "missed"
-                                : ratio < aim      ? "met"
-                                                   : "met, and the aim";
-    targets_.push_back({{"what", what},
-                        {"ours", ours},
-                        {"rival", rival},
-                        {"ratio", ratio},
-                        {"at_least", at_least},
-                        {"aim", aim},
-                        {"verdict", verdict}});
-  }
-  void not_measured(const char* what, const char* why) {
-    targets_.push_back({{"what", what}, {"ratio", nullptr}, {"verdict", "not measured"}, {"why", why}});
-  }
-
-  void print_targets() const {
-    std::printf("Targets\n");
-    for (const nlohmann::json& target : targets_) {
-      const std::string what = target["what"], verdict = target["verdict"];
-      if (target["ratio"].is_null())
-        std::printf("  %-78s %s: %s\n", what.c_str(), verdict.c_str(),
-                    target["why"].get<std::string>().c_str());
-      else
-        std::printf("  %-78s %7.2f x  (%g, aim %g): %s\n", what.c_str(), target["ratio"].get<double>(),
-                    target["at_least"].get<double>(), target["aim"].get<double>(), verdict.c_str());
-    }
-  }
-  void write(const std::filesystem::path& file, const std::string& frames, int repetitions) const {
-    const nlohmann::json result{{"program", "kbvh_broad_phase_bench"},
-                                {"time", now_utc()},
-                                {"commit", commit()},
-                                {"dirty", dirty()},
-                                {"machine", machine()},
-                                {"kernels", name(active_kernel_set())},
-                                {"frames", frames},
-                                {"repetitions", repetitions},
-                                {"clock", "processor time, median of repetitions by turns, one thread"},
-                                {"comparisons", comparisons_},
-                                {"targets", targets_}};
-    std::ofstream out(file);
-    out << result.dump(2) << '\n';
-    if (!out.flush()) throw std::runtime_error("cannot write " + file.string());
-  }
-
- private:
-  std::map<std::string, double> medians_;
-  nlohmann::json comparisons_ = nlohmann::json::array(), targets_ = nlohmann::json::array();
-};
 
 template <class S>
 struct Mesh {
@@ -434,6 +329,72 @@ void moved(std::uint32_t n, int repetitions, Table& table) {
                 10 * repetitions);
 }
 
+/// A cloth of n x n vertices, drawn over six folds whose direction swings by so many radians; 0: flat. From
+/// pi / 2 on it hangs over, from about 2.3 on layers cut each other.
+std::vector<double> folded_cloth(std::uint32_t n, double swing) {
+  std::vector<double> v;
+  double x = 0, z = 0;
+  std::vector<std::pair<double, double>> curve;
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const double direction = swing * std::sin(2 * 3.14159265358979 * 6 * i / n);
+    curve.emplace_back(x += std::cos(direction), z += std::sin(direction));
+  }
+  for (std::uint32_t row = 0; row < n; ++row)
+    for (std::uint32_t i = 0; i < n; ++i) {
+      // Wrinkles across the folds, so that no two normals are equal.
+      const double wrinkle = swing == 0 ? 0 : 0.15 * std::sin(0.9 * row + 0.3 * i);
+      v.insert(v.end(), {curve[i].first, double(row), curve[i].second + wrinkle});
+    }
+  return v;
+}
+
+/// Self intersections of a cloth of 65,522 triangles, updates included, frame by frame.
+void self_intersections(const char* what, const std::vector<double>& swings, int repetitions, Table& table) {
+  constexpr std::uint32_t n = 182;
+  std::vector<std::uint32_t> f;
+  for (std::uint32_t y = 0; y + 1 < n; ++y)
+    for (std::uint32_t x = 0; x + 1 < n; ++x) {
+      const std::uint32_t i = y * n + x;
+      f.insert(f.end(), {i, i + 1, i + n, i + 1, i + n + 1, i + n});
+    }
+  std::vector<std::vector<double>> frames;
+  for (const double swing : swings) frames.push_back(folded_cloth(n, swing));
+  const auto view = [](const std::vector<double>& v) {
+    return MatrixView<double>::by_rows(v.data(), v.size() / 3, 3);
+  };
+  CandidateBuffer out;
+  SelfIntersectionStats stats[2];
+  BroadPhase<double> broad[2];
+  std::vector<Contestant> contestants;
+  for (const bool cones : {true, false}) {
+    BroadPhase<double>& own = broad[cones ? 0 : 1];
+    own.build(view(frames[0]), MatrixView<std::uint32_t>(),
+              MatrixView<std::uint32_t>::by_rows(f.data(), f.size() / 3, 3));
+    contestants.push_back({std::string(what) + (cones ? ", cones" : ", none"), [&, cones] {
+                             SelfIntersectionStats& counts = stats[cones ? 0 : 1];
+                             counts = {};
+                             std::size_t pairs = 0;
+                             for (const auto& v : frames) {
+                               own.update(view(v));
+                               own.self_intersections(out, cones ? SelfCulling::cones : SelfCulling::none,
+                                                      &counts);
+                               pairs += out.size();
+                             }
+                             return pairs;
+                           }});
+  }
+  table.compare("Exact self intersections of 65,522 triangles, " + std::to_string(frames.size()) + " frames: " +
+                    what,
+                std::move(contestants), repetitions);
+  for (const bool cones : {true, false}) {
+    const SelfIntersectionStats& counts = stats[cones ? 0 : 1];
+    std::printf("  %s: %llu box tests, %llu triangle tests, %llu patches tested, %llu left out\n",
+                cones ? "cones" : "none", (unsigned long long)counts.box_tests,
+                (unsigned long long)counts.triangles.tests, (unsigned long long)counts.patches,
+                (unsigned long long)counts.certified);
+  }
+}
+
 int run(int argc, char** argv) {
   const std::filesystem::path folder =
       argc > 1 ? std::filesystem::path(argv[1]) : data_folder() / "ccd" / "frames" / "cloth-ball";
@@ -453,6 +414,8 @@ int run(int argc, char** argv) {
     std::printf("no pair of frames in %s\n", folder.c_str());
   }
   moved(538, repetitions, table);
+  self_intersections("flat cloth", {0}, 3 * repetitions, table);
+  self_intersections("folding cloth", {1.4, 1.6, 1.8, 2, 2.2, 2.4}, repetitions, table);
 
   const std::string scratch = "kbvh::broad_phase, double, new object and buffers";
   const std::string known = "kbvh::broad_phase, double, known tree";
@@ -474,7 +437,10 @@ int run(int argc, char** argv) {
                      "a session of a scene starts over to sweep again");
   table.not_measured("swept candidates, over boxes of CGAL and trees of Bullet and Embree",
                      "the adapters of peers have no swept pairs");
-  table.not_measured("exact self pairs, normal cones over none", "there are no cones");
+  table.target("exact self intersections of a flat cloth, cones over none", "flat cloth, cones",
+               "flat cloth, none", 4, 20);
+  table.target("exact self intersections of a folding cloth, cones over none", "folding cloth, cones",
+               "folding cloth, none", 1.3, 3);
   table.print_targets();
   if (argc > 3) table.write(argv[3], scene, repetitions);
   return 0;
