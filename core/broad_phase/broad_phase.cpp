@@ -399,8 +399,8 @@ void BroadPhase<S>::search(CandidateKind kind, CandidateBuffer& out) {
   if (job.starts.empty()) return;
   const bool filtered = filter_.looks_at(kind);
   last_box_tests_ = 1 + run_search(job, out, [&](Candidate* pairs, std::size_t count, std::uint32_t) {
-    return filtered ? filter_.keep(*elements_, kind, {pairs, count}) : count;
-  });
+                      return filtered ? filter_.keep(*elements_, kind, {pairs, count}) : count;
+                    });
 }
 
 template <class S>

@@ -48,8 +48,8 @@ struct InsertedElements {
 /// the caller's memory, any strides (matrices and maps of Eigen convert), and are read during the call only.
 /// Every call that takes positions throws std::invalid_argument, and changes nothing, for another number of
 /// rows or columns and for an inadmissible coordinate, which it names. Once warm, nothing allocates except
-/// lists that become longer than ever before. One caller's thread at a time; filters of a caller are called on
-/// it.
+/// lists that become longer than ever before. One caller's thread at a time; filters of a caller are called
+/// on it.
 template <class S>
 class BroadPhase {
  public:
@@ -113,12 +113,12 @@ class BroadPhase {
   /// Excludes pairs of one kind, in place of those excluded before. Throws std::invalid_argument for an id
   /// that does not exist.
   void exclude(CandidateKind kind, std::span<const Candidate> pairs);
-  /// Excludes pairs of elements, of all kinds, that at most `rings` edges connect: where a way of so many edges
-  /// leads from a vertex of one element to a vertex of the other. Edges are those of E and the sides of faces;
-  /// removed ones do not count. 0: incident elements only, which never are candidates. The next search lists
-  /// the vertices within so many edges of each vertex (about 1 + 3 k + 3 k^2 for k rings of a triangulation),
-  /// and does so again after elements were inserted or removed; it throws std::length_error for 2^32 of them or
-  /// more.
+  /// Excludes pairs of elements, of all kinds, that at most `rings` edges connect: where a way of so many
+  /// edges leads from a vertex of one element to a vertex of the other. Edges are those of E and the sides of
+  /// faces; removed ones do not count. 0: incident elements only, which never are candidates. The next search
+  /// lists the vertices within so many edges of each vertex (about 1 + 3 k + 3 k^2 for k rings of a
+  /// triangulation), and does so again after elements were inserted or removed; it throws std::length_error
+  /// for 2^32 of them or more.
   void exclude_rings(std::uint32_t rings);
   /// Lets a function choose among the pairs that no other filter excludes, many at a time: see PairFunction.
   /// It has to give the same answer whenever it is asked about a pair. Exceptions that it throws end the
@@ -166,11 +166,11 @@ class BroadPhase {
   /// and those of candidates do not affect each other. Throws as `within` does.
   CandidateChanges changes_within(CandidateKind kind, double distance);
 
-  /// Finds all self intersections of the faces: the pairs of faces, without a common vertex, that have a common
-  /// point, exactly as within(face_face, 0) finds them. Of a motion, at its end. Candidates are not kept, and
-  /// answers are in another order. With `cones`, the search leaves out patches that are proved not to touch
-  /// themselves (PatchCertificate): a smooth mesh has few others. After a build of the faces' tree, the first
-  /// call with cones lists contours, which takes about as long as the build.
+  /// Finds all self intersections of the faces: the pairs of faces, without a common vertex, that have a
+  /// common point, exactly as within(face_face, 0) finds them. Of a motion, at its end. Candidates are not
+  /// kept, and answers are in another order. With `cones`, the search leaves out patches that are proved not
+  /// to touch themselves (PatchCertificate): a smooth mesh has few others. After a build of the faces' tree,
+  /// the first call with cones lists contours, which takes about as long as the build.
   void self_intersections(CandidateBuffer& out, SelfCulling culling = SelfCulling::cones,
                           SelfIntersectionStats* stats = nullptr);
 
@@ -179,8 +179,8 @@ class BroadPhase {
   /// the given numbers, no epsilon (core/continuous/impact.hpp; core/broad_phase/approach.hpp), and the time
   /// is enclosed. A distance that is reached at a single instant counts, and so does t = 0. Incident elements
   /// do not count, nor do pairs that a filter excludes. Throws std::logic_error unless the last positions
-  /// were a motion, and std::invalid_argument unless 0 <= separation <= radius. With `cones`, contacts are not
-  /// looked for within patches that are proved not to touch themselves during the whole motion; with a
+  /// were a motion, and std::invalid_argument unless 0 <= separation <= radius. With `cones`, contacts are
+  /// not looked for within patches that are proved not to touch themselves during the whole motion; with a
   /// separation, cones change nothing.
   EarliestImpact earliest_impact(double separation = 0, EarliestImpactStats* stats = nullptr,
                                  SelfCulling culling = SelfCulling::cones);
@@ -240,8 +240,8 @@ class BroadPhase {
   /// Returns a search of current trees from their roots; without starts if their boxes do not meet.
   ElementSearchJob<S> search_job(CandidateKind kind);
   void search(CandidateKind kind, CandidateBuffer& out);
-  /// Searches on all threads, or on the caller's alone if a function of the caller or the size of the mesh asks
-  /// for that. Returns the number of box tests.
+  /// Searches on all threads, or on the caller's alone if a function of the caller or the size of the mesh
+  /// asks for that. Returns the number of box tests.
   template <class Sift>
   std::uint64_t run_search(const ElementSearchJob<S>& job, CandidateBuffer& out, const Sift& sift) {
     const bool alone = filter_.has_function() || job.usual < 4 * few_elements;

@@ -24,8 +24,8 @@ struct EarliestImpact {
 struct EarliestImpactStats {
   std::uint64_t candidates = 0;
   std::uint64_t culled = 0;  ///< of one patch, which does not touch itself during the motion
-  std::uint64_t later = 0;  ///< apart until an impact that was found before
-  ImpactStats impacts{};    ///< of all others
+  std::uint64_t later = 0;   ///< apart until an impact that was found before
+  ImpactStats impacts{};     ///< of all others
 };
 
 /// Takes the earlier of `earliest` and the first times at which candidates, face_vertex or edge_edge, are

@@ -20,24 +20,25 @@ template <class S>
 struct ElementSearchJob {
   CandidateKind kind;
   ElementLeaves<S> a, b;
-  std::uint32_t padded;       ///< lanes of a leaf: 8 or 16
-  KernelSet kernels;          ///< the instruction set
-  bool grouped;               ///< groups admit pairs of subtrees
+  std::uint32_t padded;  ///< lanes of a leaf: 8 or 16
+  KernelSet kernels;     ///< the instruction set
+  bool grouped;          ///< groups admit pairs of subtrees
   GroupArrays groups_a, groups_b;
-  std::size_t usual;          ///< the number of candidates for which memory is reserved first
+  std::size_t usual;                     ///< the number of candidates for which memory is reserved first
   std::span<const WidePair> starts;      ///< the pairs of nodes, or of a node and a leaf, to begin with
   std::span<const LeafSlot> leaf_pairs;  ///< pairs of leaves that come before: first, second, ...
 };
 
 /// Searches two trees of elements, or one and itself, from given pairs of nodes on, on one thread or several:
-/// the same pairs in the same order, and the same number of tests, for any number of threads. Keeps its memory.
+/// the same pairs in the same order, and the same number of tests, for any number of threads. Keeps its
+/// memory.
 template <class S>
 class ElementSearch {
  public:
-  /// Appends the pairs, without incident ones, to `out`: those of each start after those of the starts before.
-  /// `sift(pairs, count, runner)` gets up to some thousands of them at a time, moves those that stay to the
-  /// front and returns their number; its exceptions pass. Several threads call it at a time, each with another
-  /// `runner` below `workers.threads()`. Returns the number of box tests.
+  /// Appends the pairs, without incident ones, to `out`: those of each start after those of the starts
+  /// before. `sift(pairs, count, runner)` gets up to some thousands of them at a time, moves those that stay
+  /// to the front and returns their number; its exceptions pass. Several threads call it at a time, each with
+  /// another `runner` below `workers.threads()`. Returns the number of box tests.
   template <class Sift>
   std::uint64_t run(Workers& workers, const ElementSearchJob<S>& job, CandidateBuffer& out,
                     const Sift& sift) {
@@ -79,7 +80,8 @@ class ElementSearch {
   std::size_t bytes() const {
     std::size_t total = stack_.capacity() * sizeof(WidePair) + found_.capacity() * sizeof(LeafSlot) +
                         front_.bytes() + batches_.capacity() * sizeof(Batch);
-    for (const Runner& runner : runners_) total += sizeof runner + runner.found.capacity() * sizeof(Candidate);
+    for (const Runner& runner : runners_)
+      total += sizeof runner + runner.found.capacity() * sizeof(Candidate);
     return total;
   }
 

@@ -252,8 +252,7 @@ GroupArrays ElementTree<S>::groups(std::span<const GroupMask> of_elements) {
 template <class S>
 const FaceContours& ElementTree<S>::contours(std::uint32_t vertices) {
   KBVH_ASSERT(corners_each_ == 3);
-  if (!contours_listed_)
-    contours_.build(leaves(), tree_.node_count(), tree_.padded_leaf_size(), vertices);
+  if (!contours_listed_) contours_.build(leaves(), tree_.node_count(), tree_.padded_leaf_size(), vertices);
   contours_listed_ = true;
   return contours_;
 }

@@ -13,19 +13,20 @@ struct FaceSide {
   bool operator==(const FaceSide&) const = default;
 };
 
-/// The contours of the patches below the nodes of a tree over faces. The contour of a patch is what is left of
-/// the sides of its faces when sides of opposite directions cancel each other. Contours depend on the shape of
-/// the tree and on the faces' vertices only: a refit keeps them.
+/// The contours of the patches below the nodes of a tree over faces. The contour of a patch is what is left
+/// of the sides of its faces when sides of opposite directions cancel each other. Contours depend on the
+/// shape of the tree and on the faces' vertices only: a refit keeps them.
 class FaceContours {
  public:
   /// Lists the contours of the nodes [0, nodes) of a tree whose parents have smaller numbers than children.
   /// `padded` is the number of lanes of a leaf. O(sides log(sides of a node) + contours). Keeps its memory.
   template <class S>
-  void build(const ElementLeaves<S>& faces, std::uint32_t nodes, std::uint32_t padded, std::uint32_t vertices);
+  void build(const ElementLeaves<S>& faces, std::uint32_t nodes, std::uint32_t padded,
+             std::uint32_t vertices);
 
   /// Returns the contour of the patch below a node, loop after loop: each side begins where the one before
-  /// ends, and the last side of a loop ends where its first one begins. No two sides begin at the same vertex.
-  /// Empty if the contour is no such list, because loops have a common vertex or faces are directed
+  /// ends, and the last side of a loop ends where its first one begins. No two sides begin at the same
+  /// vertex. Empty if the contour is no such list, because loops have a common vertex or faces are directed
   /// inconsistently, and for closed surfaces.
   std::span<const FaceSide> of(std::uint32_t node) const {
     const Range& range = ranges_[node];
@@ -43,7 +44,7 @@ class FaceContours {
   /// Lists the sides that are left of `keys_` as the contour of a node, loop after loop if possible.
   void keep_contour(std::uint32_t node);
 
-  std::vector<Range> ranges_;   // [node]
+  std::vector<Range> ranges_;  // [node]
   std::vector<FaceSide> sides_;
   // For temporary use.
   std::vector<std::uint64_t> keys_;

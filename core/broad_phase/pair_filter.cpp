@@ -92,8 +92,7 @@ void PairFilter::exclude(const Elements& elements, CandidateKind kind, std::span
     excluded.first_pair[i] += excluded.first_pair[i - 1];
 }
 
-std::size_t PairFilter::keep(const Elements& elements, CandidateKind kind,
-                             std::span<Candidate> pairs) const {
+std::size_t PairFilter::keep(const Elements& elements, CandidateKind kind, std::span<Candidate> pairs) const {
   std::size_t count = pairs.size();
   const auto keep_if = [&](const auto& admitted) {
     std::size_t kept = 0;

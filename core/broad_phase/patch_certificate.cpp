@@ -8,8 +8,9 @@
 namespace kbvh {
 namespace {
 
-/// Bounds the rounding of sums of products of at most three factors, which are exact numbers or differences of
-/// two, relative to the sum of the products' magnitudes: at most 9 roundings each, and as many in that sum.
+/// Bounds the rounding of sums of products of at most three factors, which are exact numbers or differences
+/// of two, relative to the sum of the products' magnitudes: at most 9 roundings each, and as many in that
+/// sum.
 constexpr double relative = 20.0 * 0x1p-53;
 /// Bounds the error by underflow: 2^-1075 a product, which is multiplied by at most one difference.
 constexpr double absolute = filter::absolute3d;
@@ -94,8 +95,7 @@ bool PatchCertificate<S>::goes_on(const Axis& axis, const FaceSide& first, const
   };
   const int at_begin = product(a.begin, b.begin).sign();
   if (at_begin != 1 || end_ == nullptr) return at_begin == 1;
-  return (product(a.begin, b.end) + product(a.end, b.begin)).sign() == 1 &&
-         product(a.end, b.end).sign() == 1;
+  return (product(a.begin, b.end) + product(a.end, b.begin)).sign() == 1 && product(a.end, b.end).sign() == 1;
 }
 
 template <class S>

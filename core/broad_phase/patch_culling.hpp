@@ -8,8 +8,8 @@
 
 namespace kbvh {
 
-/// Cuts the search of a tree over faces with itself into pairs of different subtrees, and leaves out what lies
-/// within a patch that certainly does not touch itself. Keeps its memory.
+/// Cuts the search of a tree over faces with itself into pairs of different subtrees, and leaves out what
+/// lies within a patch that certainly does not touch itself. Keeps its memory.
 template <class S>
 class PatchCulling {
  public:

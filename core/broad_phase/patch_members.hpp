@@ -9,20 +9,20 @@
 
 namespace kbvh {
 
-/// The certified patches to which faces, their vertices and their sides belong. Two elements of one patch that
-/// have no common vertex do not touch: this is what tests of impacts need to know. Keeps its memory.
+/// The certified patches to which faces, their vertices and their sides belong. Two elements of one patch
+/// that have no common vertex do not touch: this is what tests of impacts need to know. Keeps its memory.
 class PatchMembers {
  public:
-  /// Marks the elements of the patches below the nodes `certified` of the faces' tree, in place of those marked
-  /// before. After `forget_sides` O(sides log(sides)), else O(elements).
+  /// Marks the elements of the patches below the nodes `certified` of the faces' tree, in place of those
+  /// marked before. After `forget_sides` O(sides log(sides)), else O(elements).
   template <class S>
   void mark(const Elements& elements, const ElementLeaves<S>& faces, std::uint32_t padded,
             std::span<const std::uint32_t> certified);
   /// Takes other faces or edges.
   void forget_sides() { sides_listed_ = false; }
 
-  /// Returns whether the two elements are known to belong to one patch. `kind` is face_vertex or edge_edge. Of
-  /// an element that belongs to more than two patches, two are known.
+  /// Returns whether the two elements are known to belong to one patch. `kind` is face_vertex or edge_edge.
+  /// Of an element that belongs to more than two patches, two are known.
   bool together(CandidateKind kind, const Candidate& pair) const {
     if (kind == CandidateKind::edge_edge) return common(edges_[pair.first], edges_[pair.second]);
     const std::uint32_t patch = faces_[pair.first];

@@ -19,7 +19,8 @@ struct SelfIntersectionStats {
   std::uint64_t patches = 0;    ///< tested: nodes of the faces' tree
   std::uint64_t certified = 0;  ///< of these: searched no further
   std::uint64_t box_tests = 0;
-  TriangleTestStats triangles{};  ///< tests: pairs of faces with overlapping boxes and without a common vertex
+  TriangleTestStats
+      triangles{};  ///< tests: pairs of faces with overlapping boxes and without a common vertex
 };
 
 /// Exact tests of pairs of faces, many at a time, by one thread. Keeps its memory.

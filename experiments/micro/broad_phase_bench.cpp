@@ -383,9 +383,9 @@ void self_intersections(const char* what, const std::vector<double>& swings, int
                              return pairs;
                            }});
   }
-  table.compare("Exact self intersections of 65,522 triangles, " + std::to_string(frames.size()) + " frames: " +
-                    what,
-                std::move(contestants), repetitions);
+  table.compare(
+      "Exact self intersections of 65,522 triangles, " + std::to_string(frames.size()) + " frames: " + what,
+      std::move(contestants), repetitions);
   for (const bool cones : {true, false}) {
     const SelfIntersectionStats& counts = stats[cones ? 0 : 1];
     std::printf("  %s: %llu box tests, %llu triangle tests, %llu patches tested, %llu left out\n",

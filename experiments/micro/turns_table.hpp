@@ -1,5 +1,6 @@
 #pragma once
-// Times of rivals by turns, their ratios, and comparisons with targets, for programs that measure by themselves.
+// Times of rivals by turns, their ratios, and comparisons with targets, for programs that measure by
+// themselves.
 #include <algorithm>
 #include <cstdio>
 #include <ctime>

@@ -154,14 +154,15 @@ TEST(BroadPhaseInC, FiltersAndEdits) {
     next.insert({mesh.edges[e + 1], mesh.edges[e]});
   }
   ASSERT_EQ(kbvh_broad_phase_exclude_rings(broad.get(), 1), 0);
-  EXPECT_EQ(wrong([&](const Candidate& pair) {
-              bool connected = false;
-              for (const std::size_t i : {0U, 1U})
-                for (const std::size_t j : {0U, 1U})
-                  connected |= next.contains({mesh.edges[2 * pair.first + i], mesh.edges[2 * pair.second + j]});
-              return !connected;
-            }),
-            "");
+  EXPECT_EQ(
+      wrong([&](const Candidate& pair) {
+        bool connected = false;
+        for (const std::size_t i : {0U, 1U})
+          for (const std::size_t j : {0U, 1U})
+            connected |= next.contains({mesh.edges[2 * pair.first + i], mesh.edges[2 * pair.second + j]});
+        return !connected;
+      }),
+      "");
   ASSERT_EQ(kbvh_broad_phase_exclude_rings(broad.get(), 0), 0);
   // Self intersections are the faces at a distance of 0.
   const std::uint32_t* within = nullptr;

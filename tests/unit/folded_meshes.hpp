@@ -8,8 +8,8 @@
 
 namespace kbvh::test::broad_phase {
 
-/// Adds a grid of columns x rows vertices; `at(u, v)` is the position of a column and a row. `closed`: the last
-/// column is joined to the first one.
+/// Adds a grid of columns x rows vertices; `at(u, v)` is the position of a column and a row. `closed`: the
+/// last column is joined to the first one.
 enum class Columns : std::uint8_t { open, closed };
 template <class S, class At>
 void add_grid(Mesh<S>& mesh, std::uint32_t columns, std::uint32_t rows, const At& at,
@@ -59,7 +59,8 @@ Mesh<S> folds(std::uint32_t side, double swing, double noise = 0) {
   Mesh<S> mesh;
   add_grid(mesh, side, side, [&](double u, double v) {
     const auto& at = curve[std::size_t(u)];
-    return std::array{at[0] + noise * random.unit(), v + noise * random.unit(), at[1] + noise * random.unit()};
+    return std::array{at[0] + noise * random.unit(), v + noise * random.unit(),
+                      at[1] + noise * random.unit()};
   });
   add_sides(mesh);
   return mesh;
@@ -106,8 +107,8 @@ Mesh<S> yarn(std::uint32_t rows) {
   return mesh;
 }
 
-/// A ramp that winds around an axis `turns` times, as in a car park, rising by `rise` a turn: all normals point
-/// upwards. With noise, storeys cut each other.
+/// A ramp that winds around an axis `turns` times, as in a car park, rising by `rise` a turn: all normals
+/// point upwards. With noise, storeys cut each other.
 template <class S>
 Mesh<S> ramp(std::uint32_t rows, double turns, double rise, double noise) {
   Random random(5);
@@ -165,7 +166,8 @@ Mesh<S> double_disc(std::uint32_t spokes, std::uint32_t rings) {
   return mesh;
 }
 
-/// The tree over the faces of a mesh, its contours, and certificates at the mesh's positions or for its motion.
+/// The tree over the faces of a mesh, its contours, and certificates at the mesh's positions or for its
+/// motion.
 template <class S>
 struct Patches {
   Elements elements;

@@ -1,5 +1,5 @@
-// Impacts within patches that are certified for a whole motion: there are none, and the earliest impact is that
-// of all pairs.
+// Impacts within patches that are certified for a whole motion: there are none, and the earliest impact is
+// that of all pairs.
 #include <gtest/gtest.h>
 
 #include "folded_meshes.hpp"
@@ -70,12 +70,14 @@ TYPED_TEST(PatchImpacts, CertifiedPatchesDoNotTouchThemselves) {
     const std::uint32_t padded = patches.tree.padded_leaf_size();
     culling.run(patches.tree.leaves(), padded, patches.contours(), patches.begin.data(), patches.end.data());
     members.mark(patches.elements, patches.tree.leaves(), padded, culling.certified());
-    for_all_impacts(mesh, patches.elements, [&](CandidateKind kind, const Candidate& pair, const Impact& impact) {
-      touching += impact.touches ? 1 : 0;
-      if (!members.together(kind, pair)) return;
-      ++together;
-      EXPECT_FALSE(impact.touches) << what << ": " << name(kind) << " " << pair.first << ", " << pair.second;
-    });
+    for_all_impacts(mesh, patches.elements,
+                    [&](CandidateKind kind, const Candidate& pair, const Impact& impact) {
+                      touching += impact.touches ? 1 : 0;
+                      if (!members.together(kind, pair)) return;
+                      ++together;
+                      EXPECT_FALSE(impact.touches)
+                          << what << ": " << name(kind) << " " << pair.first << ", " << pair.second;
+                    });
   }
   EXPECT_GT(together, 50'000u);
   EXPECT_GT(touching, 500u);

@@ -32,8 +32,7 @@ template <class S>
 std::string wrong_self(BroadPhase<S>& broad, const Pairs& expected, SelfIntersectionStats* stats = nullptr) {
   CandidateBuffer found;
   broad.self_intersections(found, SelfCulling::none);
-  std::string wrong =
-      difference(span_of(found), expected, broad.elements(), CandidateKind::face_face);
+  std::string wrong = difference(span_of(found), expected, broad.elements(), CandidateKind::face_face);
   if (!wrong.empty()) return "all patches: " + wrong;
   broad.self_intersections(found, SelfCulling::cones, stats);
   wrong = difference(span_of(found), expected, broad.elements(), CandidateKind::face_face);
@@ -77,7 +76,8 @@ TYPED_TEST(SelfIntersections, AreThoseOfAllPairs) {
         ASSERT_EQ(wrong_self(broad, expected), "") << what << ", " << name(set);
         CandidateBuffer exact;
         broad.within(CandidateKind::face_face, 0, exact);
-        ASSERT_EQ(difference(span_of(exact), expected, mesh.elements(), CandidateKind::face_face), "") << what;
+        ASSERT_EQ(difference(span_of(exact), expected, mesh.elements(), CandidateKind::face_face), "")
+            << what;
       }
   }
   EXPECT_GE(touching, 8);
@@ -135,11 +135,11 @@ TYPED_TEST(SelfIntersections, OfSheetsThatJustTouch) {
       for (std::size_t k = 0; k < 3; ++k) {
         S& x = mesh.v0[3 * v + k];
         const S other = mesh.v0[3 * w + k];
-        x = style == 0   ? other                                               // onto another vertex
-            : style == 1 ? (x + other) / 2                                     // between two
-            : style == 2 ? std::nextafter(other, S(random.below(2) * 10))      // next to it
-            : style == 3 ? x + S(int(random.below(3)) - 1)                     // by a cell
-                         : S(int(random.below(9)) - 2) / 2;                    // on half a cell
+        x = style == 0   ? other                                           // onto another vertex
+            : style == 1 ? (x + other) / 2                                 // between two
+            : style == 2 ? std::nextafter(other, S(random.below(2) * 10))  // next to it
+            : style == 3 ? x + S(int(random.below(3)) - 1)                 // by a cell
+                         : S(int(random.below(9)) - 2) / 2;                // on half a cell
       }
     }
     // In any direction, the same in exact arithmetic: coordinates change places and signs.
@@ -253,7 +253,8 @@ TYPED_TEST(SelfIntersections, AConeThatIsTooNarrowIsCaught) {
 TYPED_TEST(SelfIntersections, ContoursAreWhatIsLeftOfSides) {
   using S = TypeParam;
   std::size_t loops_with_holes = 0, closed = 0;
-  for (const Mesh<S>& mesh : {flat<S>(20), twisted_rod<S>(40, 0.3), double_disc<S>(12, 3), layers<S>(9, 3, 1)}) {
+  for (const Mesh<S>& mesh :
+       {flat<S>(20), twisted_rod<S>(40, 0.3), double_disc<S>(12, 3), layers<S>(9, 3, 1)}) {
     Patches<S> patches(mesh);
     const ElementLeaves<S> leaves = patches.tree.leaves();
     const std::uint32_t padded = patches.tree.padded_leaf_size();
