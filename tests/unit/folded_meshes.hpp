@@ -8,9 +8,9 @@
 
 namespace kbvh::test::broad_phase {
 
-/// Adds a grid of columns x rows vertices; `at(u, v)` is the position of a column and a row. `closed`: the
-/// last column is joined to the first one.
+/// `closed`: the last column of a grid is joined to the first one.
 enum class Columns : std::uint8_t { open, closed };
+/// Adds a grid of columns x rows vertices; `at(u, v)` is the position of a column and a row.
 template <class S, class At>
 void add_grid(Mesh<S>& mesh, std::uint32_t columns, std::uint32_t rows, const At& at,
               Columns ends = Columns::open) {
