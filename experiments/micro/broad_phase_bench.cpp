@@ -19,6 +19,7 @@
 #include "core/families/sweep/sorted_boxes.hpp"
 #include "core/judge/session.hpp"
 #include "experiments/common/environment.hpp"
+#include "experiments/micro/self_intersections.hpp"
 #include "experiments/micro/turns_table.hpp"
 #include "experiments/study/box_candidates.hpp"
 #include "experiments/study/contestants.hpp"
@@ -333,7 +334,7 @@ void moved(std::uint32_t n, int repetitions, Table& table) {
 /// tree with itself, each two subtrees once, and the same tree as two, in both orders.
 void both_orders(const FramePair& frames, int repetitions, Table& table) {
   const Mesh<double> mesh(frames);
-  const Elements elements = make_elements(mesh.v[0].size() / 3, MatrixView(mesh.e), MatrixView(mesh.f));
+  const Elements elements = make_elements(mesh.v[0].size() / 3, mesh.e, mesh.f);
   std::vector<double> boxes;
   for (std::size_t i = 0; i < mesh.v[0].size(); i += 3)
     for (const bool upper : {false, true}) {
@@ -365,72 +366,6 @@ void both_orders(const FramePair& frames, int repetitions, Table& table) {
                 repetitions);
 }
 
-/// A cloth of n x n vertices, drawn over six folds whose direction swings by so many radians; 0: flat. From
-/// pi / 2 on it hangs over, from about 2.3 on layers cut each other.
-std::vector<double> folded_cloth(std::uint32_t n, double swing) {
-  std::vector<double> v;
-  double x = 0, z = 0;
-  std::vector<std::pair<double, double>> curve;
-  for (std::uint32_t i = 0; i < n; ++i) {
-    const double direction = swing * std::sin(2 * 3.14159265358979 * 6 * i / n);
-    curve.emplace_back(x += std::cos(direction), z += std::sin(direction));
-  }
-  for (std::uint32_t row = 0; row < n; ++row)
-    for (std::uint32_t i = 0; i < n; ++i) {
-      // Wrinkles across the folds, so that no two normals are equal.
-      const double wrinkle = swing == 0 ? 0 : 0.15 * std::sin(0.9 * row + 0.3 * i);
-      v.insert(v.end(), {curve[i].first, double(row), curve[i].second + wrinkle});
-    }
-  return v;
-}
-
-/// Self intersections of a cloth of 65,522 triangles, updates included, frame by frame.
-void self_intersections(const char* what, const std::vector<double>& swings, int repetitions, Table& table) {
-  constexpr std::uint32_t n = 182;
-  std::vector<std::uint32_t> f;
-  for (std::uint32_t y = 0; y + 1 < n; ++y)
-    for (std::uint32_t x = 0; x + 1 < n; ++x) {
-      const std::uint32_t i = y * n + x;
-      f.insert(f.end(), {i, i + 1, i + n, i + 1, i + n + 1, i + n});
-    }
-  std::vector<std::vector<double>> frames;
-  for (const double swing : swings) frames.push_back(folded_cloth(n, swing));
-  const auto view = [](const std::vector<double>& v) {
-    return MatrixView<double>::by_rows(v.data(), v.size() / 3, 3);
-  };
-  CandidateBuffer out;
-  SelfIntersectionStats stats[2];
-  BroadPhase<double> broad[2];
-  std::vector<Contestant> contestants;
-  for (const bool cones : {true, false}) {
-    BroadPhase<double>& own = broad[cones ? 0 : 1];
-    own.build(view(frames[0]), MatrixView<std::uint32_t>(),
-              MatrixView<std::uint32_t>::by_rows(f.data(), f.size() / 3, 3));
-    contestants.push_back({std::string(what) + (cones ? ", cones" : ", none"), [&, cones] {
-                             SelfIntersectionStats& counts = stats[cones ? 0 : 1];
-                             counts = {};
-                             std::size_t pairs = 0;
-                             for (const auto& v : frames) {
-                               own.update(view(v));
-                               own.self_intersections(out, cones ? SelfCulling::cones : SelfCulling::none,
-                                                      &counts);
-                               pairs += out.size();
-                             }
-                             return pairs;
-                           }});
-  }
-  table.compare(
-      "Exact self intersections of 65,522 triangles, " + std::to_string(frames.size()) + " frames: " + what,
-      std::move(contestants), repetitions);
-  for (const bool cones : {true, false}) {
-    const SelfIntersectionStats& counts = stats[cones ? 0 : 1];
-    std::printf("  %s: %llu box tests, %llu triangle tests, %llu patches tested, %llu left out\n",
-                cones ? "cones" : "none", (unsigned long long)counts.box_tests,
-                (unsigned long long)counts.triangles.tests, (unsigned long long)counts.patches,
-                (unsigned long long)counts.certified);
-  }
-}
-
 int run(int argc, char** argv) {
   const std::filesystem::path folder =
       argc > 1 ? std::filesystem::path(argv[1]) : data_folder() / "ccd" / "frames" / "cloth-ball";
@@ -451,8 +386,7 @@ int run(int argc, char** argv) {
     std::printf("no pair of frames in %s\n", folder.c_str());
   }
   moved(538, repetitions, table);
-  self_intersections("flat cloth", {0}, 3 * repetitions, table);
-  self_intersections("folding cloth", {1.4, 1.6, 1.8, 2, 2.2, 2.4}, repetitions, table);
+  compare_self_intersections(repetitions, table);
 
   const std::string scratch = "kbvh::broad_phase, double, new object and buffers";
   const std::string known = "kbvh::broad_phase, double, known tree";
@@ -476,10 +410,6 @@ int run(int argc, char** argv) {
                      "the adapters of peers have no swept pairs");
   table.target("a tree with itself, each two subtrees once, over both orders", "each two subtrees once",
                "in both orders", 0, 0);
-  table.target("exact self intersections of a flat cloth, cones over none", "flat cloth, cones",
-               "flat cloth, none", 4, 20);
-  table.target("exact self intersections of a folding cloth, cones over none", "folding cloth, cones",
-               "folding cloth, none", 1.3, 3);
   table.print_targets();
   if (argc > 3) table.write(argv[3], scene, repetitions);
   return 0;
