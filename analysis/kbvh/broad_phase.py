@@ -166,6 +166,11 @@ class BroadPhase:
         """Excludes pairs (n, 2) of one kind, in place of those excluded before."""
         self._core.exclude(kind, np.asarray(pairs).reshape(-1, 2) if np.size(pairs) == 0 else pairs)
 
+    def use_threads(self, threads: int) -> None:
+        """Sets the number of threads that share searches, 1 at first. Answers and their order do not depend on it. Raises
+        ValueError for more threads than this machine has."""
+        self._core.use_threads(threads)
+
     def exclude_rings(self, rings: int) -> None:
         """Excludes pairs of elements, of all kinds, that at most `rings` edges connect: edges of E and sides of faces, as far as
         they are not removed. 0 ends this.

@@ -138,6 +138,13 @@ class BroadPhase {
   /// Ends all filters.
   void clear_filters();
 
+  /// Sets the number of threads (BroadPhaseSettings::threads). Throws std::invalid_argument for 0, and for
+  /// more than there are.
+  void use_threads(std::uint32_t threads) {
+    workers_ = Workers(threads);
+    face_tests_.resize(threads);
+  }
+
   /// Makes the trees of earlier searches current now; otherwise the next search does this.
   void refresh();
 

@@ -208,6 +208,10 @@ int kbvh_broad_phase_exclude(kbvh_broad_phase* handle, kbvh_candidate_kind kind,
   });
 }
 
+int kbvh_broad_phase_use_threads(kbvh_broad_phase* handle, uint32_t threads) {
+  return guarded(handle, [&](auto& broad, auto) { broad.use_threads(threads); });
+}
+
 int kbvh_broad_phase_exclude_rings(kbvh_broad_phase* handle, uint32_t rings) {
   return guarded(handle, [&](auto& broad, auto) { broad.exclude_rings(rings); });
 }

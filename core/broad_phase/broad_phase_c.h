@@ -56,6 +56,8 @@ typedef struct {
 
 /* Returns a new handle; NULL if memory or the scalar does not allow it. */
 kbvh_broad_phase* kbvh_broad_phase_new(kbvh_scalar scalar);
+/* Sets the number of threads that share searches, 1 at first; answers and their order do not depend on it. */
+int kbvh_broad_phase_use_threads(kbvh_broad_phase* broad, uint32_t threads);
 void kbvh_broad_phase_free(kbvh_broad_phase* broad);
 /* Returns what the last failed call of this handle complained about; an empty text if none failed. */
 const char* kbvh_broad_phase_error(const kbvh_broad_phase* broad);

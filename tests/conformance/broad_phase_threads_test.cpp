@@ -74,8 +74,9 @@ TEST(BroadPhaseThreads, ShareWhatConesLeave) {
   const Mesh<float> mesh = folds<float>(100, 2.4);
   std::vector<CandidateBuffer> found;
   for (const std::uint32_t threads : {1U, 4U}) {
-    BroadPhase<float> broad(BroadPhaseSettings{.threads = threads});
+    BroadPhase<float> broad;
     mesh.build(broad, 0.0F);
+    broad.use_threads(threads);
     found.emplace_back();
     SelfIntersectionStats stats;
     broad.self_intersections(found.back(), SelfCulling::cones, &stats);
@@ -88,6 +89,7 @@ TEST(BroadPhaseThreads, ShareWhatConesLeave) {
 TEST(BroadPhaseThreads, AreRefusedBeyondWhatThereIs) {
   EXPECT_THROW(BroadPhase<float>(BroadPhaseSettings{.threads = 0}), std::invalid_argument);
   EXPECT_THROW(BroadPhase<float>(BroadPhaseSettings{.threads = most_threads() + 1}), std::invalid_argument);
+  EXPECT_THROW(BroadPhase<float>().use_threads(0), std::invalid_argument);
 }
 
 }  // namespace

@@ -174,6 +174,8 @@ TEST(BroadPhaseInC, FiltersAndEdits) {
                        CandidateKind::face_face),
             "");
   EXPECT_NE(kbvh_broad_phase_self_intersections(broad.get(), nullptr, &count), 0);
+  EXPECT_EQ(kbvh_broad_phase_use_threads(broad.get(), 1), 0);
+  EXPECT_NE(kbvh_broad_phase_use_threads(broad.get(), 0), 0);
   // Edges go, and changes say so; others come.
   const std::uint32_t *begun = nullptr, *ended = nullptr;
   std::size_t begun_count = 0, ended_count = 0;
