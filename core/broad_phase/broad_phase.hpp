@@ -141,8 +141,9 @@ class BroadPhase {
   /// Sets the number of threads (BroadPhaseSettings::threads). Throws std::invalid_argument for 0, and for
   /// more than there are.
   void use_threads(std::uint32_t threads) {
-    workers_ = Workers(threads);
+    Workers workers(threads);
     face_tests_.resize(threads);
+    workers_ = std::move(workers);
   }
 
   /// Makes the trees of earlier searches current now; otherwise the next search does this.
