@@ -51,6 +51,17 @@ struct Plane {
   int dropped = 0, kept[2];
 };
 
+/// Returns the sign of axis . ((b - a) x (c - a)).
+template <class S>
+int rest_sign(const std::array<double, 3>& axis, const S* a, const S* b, const S* c) {
+  double d[3], e[3];
+  for (std::size_t k = 0; k < 3; ++k) {
+    d[k] = double(b[k]) - double(a[k]);
+    e[k] = double(c[k]) - double(a[k]);
+  }
+  return determinant(axis, d, e).sign();
+}
+
 /// Combines the signs of the Bernstein coefficients of a polynomial into that of the polynomial on [0, 1].
 int common(int a, int b, int c) {
   return a == b && b == c && a != undecided_sign ? a : 0;
@@ -143,6 +154,7 @@ bool PatchCertificate<S>::find_axis(std::span<const FaceSide> contour, Axis& axi
 template <class S>
 bool PatchCertificate<S>::normals_agree(const ElementLeaves<S>& faces, std::uint32_t padded,
                                         std::uint32_t node, const Axis& axis) {
+  const auto point = [this](std::uint32_t v) { return begin_ + std::size_t(4) * v; };
   nodes_.assign(1, node);
   while (!nodes_.empty()) {
     const WideNode& at = faces.tree.nodes[nodes_.back()];
@@ -152,7 +164,9 @@ bool PatchCertificate<S>::normals_agree(const ElementLeaves<S>& faces, std::uint
       const std::uint32_t count = faces.end_entry[leaf] - faces.first_entry[leaf];
       for (std::uint32_t lane = 0; lane < count; ++lane) {
         const std::uint32_t a = corners[lane], b = corners[padded + lane], c = corners[2 * padded + lane];
-        if (turn(axis, difference(b, a), difference(c, a)) != 1) return false;
+        if (end_ != nullptr ? turn(axis, difference(b, a), difference(c, a)) != 1
+                            : rest_sign(axis, point(a), point(b), point(c)) != 1)
+          return false;
       }
     }
     for (std::uint32_t c = 0; c < std::uint32_t(at.count - at.leaf_count); ++c)
