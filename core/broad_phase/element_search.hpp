@@ -112,9 +112,15 @@ class ElementSearch {
     }
     const auto traverse = stepping(job);
     front_.start();
-    for (const WidePair& start : job.starts) front_.add(0, start);
+    for (std::size_t i = 0; i < job.starts.size(); ++i) front_.add(std::uint32_t(i));
     std::uint64_t tests = front_.traverse(
-        workers, [&](std::uint32_t, WideTraversal& state) { traverse(state); },
+        workers,
+        [&](std::uint32_t i, WideTraversal& state) {
+          // A front begins at the roots, which no other pair on a stack consists of.
+          WidePair& bottom = state.stack[0];
+          if (bottom.first == 0 && bottom.second == 0) bottom = job.starts[i];
+          traverse(state);
+        },
         [](const SharedFront::Batch&, std::uint32_t) {});
     batches_.clear();
     for_each_batch(job.leaf_pairs, SharedFront::batch_pairs, [&](std::span<const LeafSlot> leaf_pairs) {

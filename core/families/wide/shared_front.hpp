@@ -46,11 +46,8 @@ class SharedFront {
     found_.clear();
     expansion_tests_ = 0;
   }
-  /// Adds a traversal that starts at a pair of nodes, or of a node and a leaf: the roots, unless others are
-  /// given. It follows those already added.
-  void add(std::uint32_t traversal, WidePair start = {0, 0}) {
-    items_.push_back({start, traversal, Item::pair, 0, 0});
-  }
+  /// Adds a traversal that starts at the roots; it follows those already added.
+  void add(std::uint32_t traversal) { items_.push_back({{0, 0}, traversal, Item::pair, 0, 0}); }
 
   /// Expands the front, and traverses it. Calls `take(batch, runner)` with pairs of leaves as they are found,
   /// in any order. Returns the box tests made.
