@@ -273,7 +273,7 @@ void BroadPhase<S>::remove(Element element, std::span<const std::uint32_t> ids) 
   const char* const word = element == Element::vertex ? "vertex "
                            : element == Element::edge ? "edge "
                                                       : "face ";
-  std::vector<std::uint32_t> sorted(ids.begin(), ids.end());
+  UnfilledArray<std::uint32_t> sorted(ids.begin(), ids.end());  // GCC 12 warns wrongly about std::allocator's
   std::sort(sorted.begin(), sorted.end());
   for (std::size_t i = 0; i < sorted.size(); ++i) {
     const std::uint32_t id = sorted[i];
@@ -286,7 +286,7 @@ void BroadPhase<S>::remove(Element element, std::span<const std::uint32_t> ids) 
   if (sorted.empty()) return;
   for (const std::uint32_t id : sorted) list.remove(id);
   if (element != Element::vertex) connections_changed();
-  trees_[std::size_t(element)].elements_removed(boxes_.data(), sorted);
+  trees_[std::size_t(element)].elements_removed(boxes_.data(), {sorted.data(), sorted.size()});
   for (const CandidateKind kind : candidate_kinds) {
     CandidateBuffer& found = found_[std::size_t(kind)];
     if (!found_valid_[std::size_t(kind)]) continue;
