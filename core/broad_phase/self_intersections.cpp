@@ -121,6 +121,8 @@ template class FaceTests<float>;
 template class FaceTests<double>;
 template void BroadPhase<float>::self_intersections(CandidateBuffer&, SelfCulling, SelfIntersectionStats*);
 template void BroadPhase<double>::self_intersections(CandidateBuffer&, SelfCulling, SelfIntersectionStats*);
+template const PatchMembers& BroadPhase<float>::certified_patches();
+template const PatchMembers& BroadPhase<double>::certified_patches();
 template EarliestImpact BroadPhase<float>::earliest_impact(double, EarliestImpactStats*, SelfCulling);
 template EarliestImpact BroadPhase<double>::earliest_impact(double, EarliestImpactStats*, SelfCulling);
 
