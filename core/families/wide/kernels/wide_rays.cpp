@@ -1,6 +1,5 @@
 #include "core/families/wide/kernels/wide_rays.hpp"
 
-#include "core/geometry/filter_bounds.hpp"
 #include "core/kernels/point_lanes.hpp"
 
 namespace kbvh {
@@ -83,91 +82,184 @@ std::uint64_t screen(const WideRayBlock<S>& rays, const S* child_bounds, std::ui
 }
 
 // ---- Filter of triangles ----------------------------------------------------------------------------------
+//
+// Seen along the ray, a triangle is missed if the origin lies strictly on different sides of two of its edges.
+// Let a corner P relative to the ray's origin be (X, Y, Z), with Z along an axis in which the direction
+// (p, q, r) is largest. Its place in that view is x = X - Z p/r, y = Y - Z q/r, and the three sides are
+// u = x1 y2 - x2 y1, v = x2 y0 - x0 y2, w = x0 y1 - x1 y0: the volumes of core/geometry/ray_triangle.cpp over
+// r. There are four products of places in a side, and no product of three differences.
+//
+// Error. Let e be the unit roundoff, m the largest computed |x| or |y| of the corners, d the largest computed
+// |Z|. The quotient, its product with Z, the difference P - o and the last subtraction round once each, and
+// |p/r| <= 1, |X| <= |x| + |Z|: a computed place is wrong by at most f = (2 m + 4 d) e (1 + 16 e). A side is
+// then wrong by at most 4 m f + 2 f^2, and by 4 m^2 e (1 + 2 e) from its own roundings. Together these are
+// (12 m^2 + 16 m d) e + 32 d^2 e^2, but for terms that are smaller by 2^-15. `bound_of` computes
+// 14 m^2 e + 18 m d e + 36 d^2 e^2, whose surplus exceeds its own six roundings.
+// Underflow: a product is wrong by at most the smallest denormal, which m and d multiply at most once. Where
+// m (1 + d) is below 2^27 (in float), `tiny` exceeds this; above, the surplus does.
+// Overflow: if m^2 is finite, so are all products; if it is not, the bound is infinite and nothing is missed.
 
 template <class S>
-KBVH_INLINE Point<S> cross(const Point<S>& p, const Point<S>& q) {
-  return {p.y * q.z - p.z * q.y, p.z * q.x - p.x * q.z, p.x * q.y - p.y * q.x};
-}
-/// Returns the sums of absolute products of a cross product, and the underflow term for float.
-template <class S>
-KBVH_INLINE Point<S> cross_magnitude(const Point<S>& p, const Point<S>& q) {
-  constexpr S minor = sizeof(S) == sizeof(float) ? S(filter::minor3f) : S(0);
-  return {p.y * q.z + p.z * q.y + minor, p.z * q.x + p.x * q.z + minor, p.x * q.y + p.y * q.x + minor};
-}
-template <class S>
-KBVH_INLINE Values<S> error_bound(Values<S> permanent) {
-  if constexpr (sizeof(S) == sizeof(float))
-    return permanent * filter::relative3f + filter::absolute3f;
-  else
-    return permanent * filter::relative3d + filter::absolute3d;
+struct FilterBound;
+template <>
+struct FilterBound<float> {
+  static constexpr float unit = 0x1p-24F, grow = 1 + 0x1p-20F, tiny = 0x1p-120F;
+};
+template <>
+struct FilterBound<double> {
+  static constexpr double unit = 0x1p-53, grow = 1 + 0x1p-49, tiny = 0x1p-1000;
+};
+
+template <class S, std::size_t n>
+KBVH_INLINE Vector<S, n> magnitude(Vector<S, n> x) {
+  using W = Vector<Word<S>, n>;
+  return __builtin_bit_cast(Vector<S, n>, __builtin_bit_cast(W, x) & (~Word<S>(0) >> 1));
 }
 
-/// Returns a mask of the triangles that the ray may meet within its limit; rows[c][k] is corner c of triangle
-/// k. Uses the volumes of core/geometry/ray_triangle.cpp with one error bound for all three, computed from
-/// the largest edges and distances.
-template <class S>
-KBVH_INLINE unsigned may_meet(const WideRay<S>& ray, const S* const (&rows)[3][lanes<S>]) {
-  const Point<S> corner[3] = {load_points(rows[0]), load_points(rows[1]), load_points(rows[2])};
-  const Values<S> zero{};
-  const Point<S> origin{zero + ray.origin[0], zero + ray.origin[1], zero + ray.origin[2]};
-  const Point<S> direction{zero + ray.direction[0], zero + ray.direction[1], zero + ray.direction[2]};
-  const Point<S> to[3] = {corner[0] - origin, corner[1] - origin, corner[2] - origin};
-  const Point<S> edge[3] = {corner[1] - corner[0], corner[2] - corner[1], corner[0] - corner[2]};
-  const Values<S> v0 = dot(cross(to[0], edge[0]), direction), v1 = dot(cross(to[1], edge[1]), direction),
-                  v2 = dot(cross(to[2], edge[2]), direction);
-  const Point<S> reach = larger(larger(absolute(to[0]), absolute(to[1])), absolute(to[2]));
-  const Point<S> size = larger(larger(absolute(edge[0]), absolute(edge[1])), absolute(edge[2]));
-  const Point<S> steepness = absolute(direction);
-  const Values<S> bound = error_bound<S>(dot(cross_magnitude(reach, size), steepness));
-  const Values<S> lowest = smaller(smaller(v0, v1), v2);
-  const Values<S> highest = larger(larger(v0, v1), v2);
-  Words<S> missed = greater<S>(-lowest, bound) & greater<S>(highest, bound);
-  // Beyond the limit: |height| > limit |slope|; or behind the origin: height and slope have different signs.
-  const Point<S> normal = cross(edge[2], edge[0]), magnitude = cross_magnitude(size, size);
-  const Values<S> height = dot(normal, to[0]), slope = dot(normal, direction);
-  const Values<S> height_bound = error_bound<S>(dot(magnitude, reach)),
-                  slope_bound = error_bound<S>(dot(magnitude, steepness));
-  const Values<S> far = (absolute<S>(slope) + slope_bound) * ray.limit * S(1 + 0x1p-20);
-  missed |= greater<S>(absolute<S>(height) - height_bound, far);
-  const Words<S> differ = bits<S>(height) ^ bits<S>(slope);
-  const unsigned behind = high_bits<S>(differ) & high_bits<S>(greater<S>(absolute<S>(height), height_bound)) &
-                          high_bits<S>(greater<S>(absolute<S>(slope), slope_bound));
-  return ~(high_bits<S>(missed) | behind);
+template <class S, std::size_t n>
+KBVH_INLINE Vector<S, n> bound_of(Vector<S, n> m, Vector<S, n> d) {
+  using B = FilterBound<S>;
+  const Vector<S, n> far = d * (6 * B::unit);
+  return m * m * (14 * B::unit) + (m * S(3) + far) * far + B::tiny;
 }
 
-/// Decides the primitives of a leaf that the ray may meet. Returns whether the search has ended.
-template <class S>
-KBVH_INLINE bool decide_leaf(WideRayJob<S>& job, std::uint32_t begin, std::uint32_t end) {
-  if (job.offsets == nullptr || end - begin < 2) {
-    for (; begin < end; ++begin)
-      if (job.decide(job.context, job.entries[begin])) return true;
-    return false;
+/// Returns bit i if x > y in lane i.
+template <class V>
+KBVH_INLINE unsigned above(V x, V y) {
+#if defined(KBVH_KERNELS_avx512)
+  // GCC 12 makes a vector of a comparison, and a mask of that vector.
+  if constexpr (sizeof(V) == 64) {
+    if constexpr (sizeof(x[0]) == 4)
+      return unsigned(_mm512_cmp_ps_mask((__m512)x, (__m512)y, _CMP_GT_OQ)) & 0xffffU;
+    else
+      return unsigned(_mm512_cmp_pd_mask((__m512d)x, (__m512d)y, _CMP_GT_OQ)) & 0xffU;
   }
-  job.tests += end - begin;  // added at once: the same with registers of any width
-  for (; begin < end; begin += lanes<S>) {
-    const std::uint32_t count = end - begin < lanes<S> ? end - begin : lanes<S>;
+#endif
+  return mask_bits(x > y);
+}
+
+/// Returns a mask of n triangles that the ray may meet within its limit; row[corner][axis][0 .. n) are
+/// their corners.
+template <class S, std::size_t n>
+KBVH_INLINE unsigned may_meet(const WideRay<S>& ray, const S* corners, std::size_t row) {
+  using V = Vector<S, n>;
+  V x[3], y[3], z[3];
+  for (std::size_t c = 0; c < 3; ++c) {
+    const S* const corner = corners + 3 * c * row;
+    const V along = load_lanes<V>(corner + ray.axes[2] * row) - ray.origin[2];
+    x[c] = load_lanes<V>(corner + ray.axes[0] * row) - ray.origin[0] - along * ray.shear[0];
+    y[c] = load_lanes<V>(corner + ray.axes[1] * row) - ray.origin[1] - along * ray.shear[1];
+    z[c] = along * ray.sign;
+  }
+  const V u = x[1] * y[2] - x[2] * y[1], v = x[2] * y[0] - x[0] * y[2], w = x[0] * y[1] - x[1] * y[0];
+  V m = larger(magnitude<S, n>(x[0]), magnitude<S, n>(y[0]));
+  for (std::size_t c = 1; c < 3; ++c) {
+    m = larger(magnitude<S, n>(x[c]), m);
+    m = larger(magnitude<S, n>(y[c]), m);
+  }
+  const V nearest = smaller(smaller(z[0], z[1]), z[2]), farthest = larger(larger(z[0], z[1]), z[2]);
+  const V bound = bound_of<S, n>(m, larger(-nearest, farthest));
+  const unsigned aside = above<V>(-smaller(smaller(u, v), w), bound) & above<V>(larger(larger(u, v), w), bound);
+  // The point in which the ray meets the triangle lies between its corners along the axis, too. A difference
+  // has the sign of the exact one.
+  const S limit = ray.limit * ray.steepness * FilterBound<S>::grow + FilterBound<S>::tiny;
+  const unsigned beyond = above<V>(nearest, V{} + limit), behind = above<V>(V{}, farthest);
+  return ~(aside | beyond | behind);
+}
+
+/// Copies the corners of a leaf's entries to rows; returns a mask of the entries that are no triangles, whose
+/// copy is of their first corner only. Lanes past the end repeat the first entry of their register.
+template <class S>
+[[gnu::noinline]] unsigned copy_corners(const WideRayJob<S>& job, std::uint32_t begin, std::uint32_t end,
+                                        S* to) {
+  const std::uint32_t row = job.row;
+  unsigned unusual = 0;
+  for (std::uint32_t first = 0; first < end - begin; first += lanes<S>) {
+    const std::uint32_t left = end - begin - first, count = left < lanes<S> ? left : lanes<S>;
     const S* rows[3][lanes<S>];
-    unsigned unusual = 0;
     if (job.triangle_corners != nullptr) {
-      const std::uint32_t* const corners = job.triangle_corners + std::size_t(3) * begin;
+      const std::uint32_t* const corners = job.triangle_corners + std::size_t(3) * (begin + first);
       for (std::uint32_t k = 0; k < lanes<S>; ++k)
         for (std::uint32_t c = 0; c < 3; ++c)
           rows[c][k] = job.positions + corners[3 * (k < count ? k : 0) + c];
     } else {
       for (std::uint32_t k = 0; k < lanes<S>; ++k) {
-        const std::uint32_t primitive = job.entries[begin + (k < count ? k : 0)];
+        const std::uint32_t primitive = job.entries[begin + first + (k < count ? k : 0)];
         const std::uint32_t corner = job.offsets[primitive];
         const bool triangle = job.offsets[primitive + 1] - corner == 3;
-        unusual |= unsigned(!triangle) << k;
+        unusual |= k < count ? unsigned(!triangle) << (first + k) : 0U;
         for (std::uint32_t c = 0; c < 3; ++c)
           rows[c][k] = job.positions + std::size_t(3) * job.vertices[corner + (triangle ? c : 0)];
       }
     }
-    unsigned open = (may_meet<S>(*job.ray, rows) | unusual) & ((2U << (count - 1)) - 1);
+    const auto store = [&](std::size_t place, const Values<S>& values) {
+      S* const at = to + place * row + first;
+      if (row >= lanes<S>) {
+        store_lanes(at, values);
+        return;
+      }
+      if constexpr (lanes<S> > 4) {
+        if (row == 4) __builtin_memcpy(at, &values, 4 * sizeof(S));
+      }
+      if constexpr (lanes<S> > 8) {
+        if (row == 8) __builtin_memcpy(at, &values, 8 * sizeof(S));
+      }
+    };
+    for (std::size_t c = 0; c < 3; ++c) {
+      const Point<S> corner = load_points(rows[c]);
+      store(3 * c, corner.x);
+      store(3 * c + 1, corner.y);
+      store(3 * c + 2, corner.z);
+    }
+  }
+  return unusual;
+}
+
+/// Decides those of a leaf's `count` entries from `begin` that the ray may meet. Returns whether the search
+/// has ended.
+template <class S, std::size_t row>
+KBVH_INLINE bool decide_copied(WideRayJob<S>& job, std::uint32_t begin, std::uint32_t count, const S* corners,
+                               unsigned unusual) {
+  constexpr std::uint32_t n = lanes<S> < row ? lanes<S> : row;
+  for (std::uint32_t first = 0; first < count; first += n) {
+    const std::uint32_t here = count - first < n ? count - first : n;
+    unsigned open = (may_meet<S, n>(*job.ray, corners + first, row) | unusual >> first) & ((2U << (here - 1)) - 1);
     for (; open != 0; open &= open - 1)
-      if (job.decide(job.context, job.entries[begin + unsigned(__builtin_ctz(open))])) return true;
+      if (job.decide(job.context, job.entries[begin + first + unsigned(__builtin_ctz(open))])) return true;
   }
   return false;
+}
+
+/// Decides the primitives of a leaf that the ray may meet. Returns whether the search has ended.
+template <class S>
+KBVH_INLINE bool decide_leaf(WideRayJob<S>& job, std::uint32_t leaf) {
+  const std::uint32_t begin = job.first_entry[leaf], count = job.end_entry[leaf] - begin;
+  if (job.offsets == nullptr || count < 2 || job.ray->steepness == 0) {
+    for (std::uint32_t entry = begin; entry < begin + count; ++entry)
+      if (job.decide(job.context, job.entries[entry])) return true;
+    return false;
+  }
+  job.tests += count;  // added at once: the same with registers of any width
+  alignas(64) S own[9 * 16];
+  const S* corners = own;
+  unsigned unusual = 0;
+  if (job.copied == nullptr) {
+    unusual = copy_corners(job, begin, begin + count, own);
+  } else {
+    S* const kept = job.copied + std::size_t(9) * job.row * leaf;
+    WideLeafCopy& copy = job.copies[leaf];
+    if (copy.stamp != job.stamp) copy = {job.stamp, copy_corners(job, begin, begin + count, kept)};
+    unusual = copy.unusual;
+    corners = kept;
+  }
+  switch (job.row) {
+    case 4:
+      return decide_copied<S, 4>(job, begin, count, corners, unusual);
+    case 8:
+      return decide_copied<S, 8>(job, begin, count, corners, unusual);
+    default:
+      return decide_copied<S, 16>(job, begin, count, corners, unusual);
+  }
 }
 
 template <class S, std::uint32_t width>
@@ -182,7 +274,7 @@ void follow(WideRayJob<S>& job) {
       if ((item & WidePair::leaf_bit) != 0) {
         const LeafSlot slot{item & ~WidePair::leaf_bit};
         const std::uint32_t leaf = job.tree.nodes[slot.node()].first_leaf + slot.lane();
-        job.over = decide_leaf(job, job.first_entry[leaf], job.end_entry[leaf]);
+        job.over = decide_leaf(job, leaf);
         if (job.over) return;
         reach = reach_of(ray);
         break;

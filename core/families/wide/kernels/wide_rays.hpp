@@ -14,8 +14,19 @@ template <class S>
 struct WideRay {
   std::uint32_t enter_row[3], leave_row[3];
   S add[3], scale[3];
-  S origin[3], direction[3];
   S limit;  ///< nothing beyond this parameter can be the answer
+  // For the filter of triangles, which looks along an axis in which the direction is largest.
+  std::uint32_t axes[3];  ///< the two others in cyclic order, and this axis
+  S origin[3];            ///< in the order of `axes`
+  S shear[2];             ///< the direction's components along axes[0] and axes[1] over that along axes[2]
+  S steepness;            ///< magnitude of the direction along axes[2]; 0: the ray is a point
+  S sign;                 ///< 1 or -1: that of the direction along axes[2]
+};
+
+/// Says whether a leaf's corners were copied.
+struct WideLeafCopy {
+  std::uint32_t stamp = 0;
+  std::uint32_t unusual = 0;  ///< bit k: entry k is no triangle, and its copy is of its first corner only
 };
 
 /// A node, or a leaf as in `WidePair`, and the parameter at which the ray enters it.
@@ -39,7 +50,14 @@ struct WideRayJob {
   const std::uint32_t* vertices;
   /// [entry][3]: corners of the entries' primitives, times 3; null: they are found by offsets and vertices.
   const std::uint32_t* triangle_corners;
-  const S* positions;         ///< [vertex][3], one scalar past the end
+  const S* positions;  ///< [vertex][3], one scalar past the end
+  /// Entries of leaves, padded to 4, 8 or 16: numbers in a row of copied corners.
+  std::uint32_t row;
+  /// [leaf][corner][axis][row]: the corners of leaves that a ray has reached, copied at the first one; null:
+  /// each ray reads them from `positions`.
+  S* copied;
+  WideLeafCopy* copies;  ///< [leaf]
+  std::uint32_t stamp;   ///< of the copies that are current
   const std::uint8_t* stale;  ///< [node]: not 0 while its children's boxes must be made; null: none
   WideRayItem<S>* stack;
   std::size_t depth, room;
