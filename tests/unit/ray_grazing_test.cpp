@@ -142,7 +142,8 @@ class GrazingRays {
   void nudge(S* values) {
     for (int axis = 0; axis < 3; ++axis)
       for (std::uint32_t steps = below(3); steps-- > 0;)
-        values[axis] = std::nextafter(values[axis], std::numeric_limits<S>::infinity() * S(below(2) == 0 ? 1 : -1));
+        values[axis] =
+            std::nextafter(values[axis], std::numeric_limits<S>::infinity() * S(below(2) == 0 ? 1 : -1));
   }
 
   const Playback<S>& playback_;
@@ -245,7 +246,9 @@ void check_scene(Shape shape, double size, double shift, std::uint32_t seed, Tot
   for (const KernelSet set : supported_kernel_sets()) {
     const BuilderConfig builder{.method = BuildMethod::median,
                                 .width = variant % 2 == 0 ? 8U : 4U,
-                                .leaf_size = variant % 3 == 0 ? 4U : variant % 3 == 1 ? 7U : 16U};
+                                .leaf_size = variant % 3 == 0   ? 4U
+                                             : variant % 3 == 1 ? 7U
+                                                                : 16U};
     ++variant;
     playback.seek(0);
     playback.evaluate_all();
@@ -259,13 +262,14 @@ void check_scene(Shape shape, double size, double shift, std::uint32_t seed, Tot
       totals.rays += 2 * all.size();
       totals.faces += 2 * all.size() * 200;
       for (std::size_t i = 0; i < all.size(); ++i) {
-        ASSERT_EQ(found[i], truth[frame][i]) << name(set) << ", size " << size << ", shift " << shift << ", ray "
-                                             << i % 10 << ", " << i;
+        ASSERT_EQ(found[i], truth[frame][i])
+            << name(set) << ", size " << size << ", shift " << shift << ", ray " << i % 10 << ", " << i;
         ASSERT_EQ(bool(any[i]), bool(truth[frame][i])) << name(set) << ", " << i;
       }
       // One at a time: too few rays to copy corners.
       for (std::size_t i = 0; i < all.size(); i += 37)
-        ASSERT_EQ(wide.ask(RayQuery::closest, all.subspan(i, 1))[0], truth[frame][i]) << name(set) << ", " << i;
+        ASSERT_EQ(wide.ask(RayQuery::closest, all.subspan(i, 1))[0], truth[frame][i])
+            << name(set) << ", " << i;
     }
     totals.offered += wide.stats().tests;
   }
@@ -284,10 +288,11 @@ void check_grazing_rays() {
     for (const double shift : {100.0, 1000.3, in_float ? 70000.5 : 1e12})
       check_scene<S>(shape, 1, shift, ++seed, totals);
   }
-  std::printf("%llu rays, %llu hits of %llu; a filter without bounds loses %llu; %.3g faces a ray are decided\n",
-              static_cast<unsigned long long>(totals.rays), static_cast<unsigned long long>(totals.hits),
-              static_cast<unsigned long long>(2 * 24 * 10 * std::uint64_t(rays_of_a_kind())),
-              static_cast<unsigned long long>(totals.lost), double(totals.offered) / double(totals.rays));
+  std::printf(
+      "%llu rays, %llu hits of %llu; a filter without bounds loses %llu; %.3g faces a ray are decided\n",
+      static_cast<unsigned long long>(totals.rays), static_cast<unsigned long long>(totals.hits),
+      static_cast<unsigned long long>(2 * 24 * 10 * std::uint64_t(rays_of_a_kind())),
+      static_cast<unsigned long long>(totals.lost), double(totals.offered) / double(totals.rays));
   // The rays are hard, and the filter leaves out most faces all the same.
   EXPECT_GT(totals.hits, totals.rays / 100);
   EXPECT_GT(totals.lost, 24U * rays_of_a_kind() / 10);

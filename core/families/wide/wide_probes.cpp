@@ -89,8 +89,7 @@ void WideProbes<S>::run(const Probes<S>& probes, TriangleTestStats& stats, std::
 template <class S>
 std::size_t WideProbes<S>::bytes() const {
   return sizeof(WideRays<S>) + rays_->bytes() + sides_.capacity() * sizeof(WideProbeSide<S>) +
-         work_.capacity() * sizeof(RayWork) + nodes_.capacity() * sizeof(std::uint32_t) +
-         entered_.capacity();
+         work_.capacity() * sizeof(RayWork) + nodes_.capacity() * sizeof(std::uint32_t) + entered_.capacity();
 }
 
 template class WideProbes<float>;

@@ -136,8 +136,8 @@ void WideRays<S>::prepare(std::size_t rays) {
       const auto& all = *static_cast<WideRays*>(context);
       all.make_(all.body_, node);
     };
-    job.decide = [](void* context, std::uint32_t primitive) {
-      return static_cast<WideRays*>(context)->decide(primitive);
+    job.decide = [](void* context, std::uint32_t primitive, const S* corners) {
+      return static_cast<WideRays*>(context)->decide(primitive, corners);
     };
     job.row = std::max(4U, tree.padded_leaf_size());
     job.stamp = stamp_;
@@ -151,7 +151,7 @@ void WideRays<S>::prepare(std::size_t rays) {
   if (ids_.empty()) return;
   all_bodies_.kernel = wide_ray_kernels<S>(bodies_.kernels()).follow(bodies_.width());
   all_bodies_.job = job_in(bodies_);
-  all_bodies_.job.decide = [](void* context, std::uint32_t primitive) {
+  all_bodies_.job.decide = [](void* context, std::uint32_t primitive, const S*) {
     auto& all = *static_cast<WideRays*>(context);
     return all.enter(all.ids_[primitive]);
   };
@@ -205,10 +205,13 @@ bool WideRays<S>::enter(std::uint32_t body) {
 }
 
 template <class S>
-bool WideRays<S>::decide(std::uint32_t primitive) {
+bool WideRays<S>::decide(std::uint32_t primitive, const S* corners) {
+  static constexpr std::uint32_t in_order[3] = {0, 1, 2};
   const double limit = search_->limit();
-  const bool over = search_->offer(body_, primitive, scene_.primitives(body_).triangles(primitive),
-                                   motion_.positions(body_), *stats_);
+  const bool over = corners != nullptr
+                        ? search_->offer(body_, primitive, PolygonTriangles(in_order), corners, *stats_)
+                        : search_->offer(body_, primitive, scene_.primitives(body_).triangles(primitive),
+                                         motion_.positions(body_), *stats_);
   if (search_->limit() != limit) ray_.limit = at_least<S>(search_->limit());
   return over;
 }

@@ -53,8 +53,9 @@ class WideRays {
   bool follow(Traversal& search, std::vector<WideRayItem<S>>& stack);
   /// Follows the current ray through one body. Returns whether the search has ended.
   bool enter(std::uint32_t body);
-  /// Decides a primitive of the current body for the current ray. Returns whether the search has ended.
-  bool decide(std::uint32_t primitive);
+  /// Decides a primitive of the current body for the current ray; `corners`, [3][3], are those of a triangle,
+  /// or null. Returns whether the search has ended.
+  bool decide(std::uint32_t primitive, const S* corners);
 
   SceneView<S> scene_;
   SampledMotion<S> motion_;

@@ -83,11 +83,11 @@ std::uint64_t screen(const WideRayBlock<S>& rays, const S* child_bounds, std::ui
 
 // ---- Filter of triangles ----------------------------------------------------------------------------------
 //
-// Seen along the ray, a triangle is missed if the origin lies strictly on different sides of two of its edges.
-// Let a corner P relative to the ray's origin be (X, Y, Z), with Z along an axis in which the direction
-// (p, q, r) is largest. Its place in that view is x = X - Z p/r, y = Y - Z q/r, and the three sides are
-// u = x1 y2 - x2 y1, v = x2 y0 - x0 y2, w = x0 y1 - x1 y0: the volumes of core/geometry/ray_triangle.cpp over
-// r. There are four products of places in a side, and no product of three differences.
+// Seen along the ray, a triangle is missed if the origin lies strictly on different sides of two of its
+// edges. Let a corner P relative to the ray's origin be (X, Y, Z), with Z along an axis in which the
+// direction (p, q, r) is largest. Its place in that view is x = X - Z p/r, y = Y - Z q/r, and the three sides
+// are u = x1 y2 - x2 y1, v = x2 y0 - x0 y2, w = x0 y1 - x1 y0: the volumes of core/geometry/ray_triangle.cpp
+// over r. There are four products of places in a side, and no product of three differences.
 //
 // Error. Let e be the unit roundoff, m the largest computed |x| or |y| of the corners, d the largest computed
 // |Z|. The quotient, its product with Z, the difference P - o and the last subtraction round once each, and
@@ -159,7 +159,8 @@ KBVH_INLINE unsigned may_meet(const WideRay<S>& ray, const S* corners, std::size
   }
   const V nearest = smaller(smaller(z[0], z[1]), z[2]), farthest = larger(larger(z[0], z[1]), z[2]);
   const V bound = bound_of<S, n>(m, larger(-nearest, farthest));
-  const unsigned aside = above<V>(-smaller(smaller(u, v), w), bound) & above<V>(larger(larger(u, v), w), bound);
+  const unsigned aside =
+      above<V>(-smaller(smaller(u, v), w), bound) & above<V>(larger(larger(u, v), w), bound);
   // The point in which the ray meets the triangle lies between its corners along the axis, too. A difference
   // has the sign of the exact one.
   const S limit = ray.limit * ray.steepness * FilterBound<S>::grow + FilterBound<S>::tiny;
@@ -198,10 +199,10 @@ template <class S>
         store_lanes(at, values);
         return;
       }
-      if constexpr (lanes<S> > 4) {
+      if constexpr (lanes < S >> 4) {
         if (row == 4) __builtin_memcpy(at, &values, 4 * sizeof(S));
       }
-      if constexpr (lanes<S> > 8) {
+      if constexpr (lanes < S >> 8) {
         if (row == 8) __builtin_memcpy(at, &values, 8 * sizeof(S));
       }
     };
@@ -223,9 +224,15 @@ KBVH_INLINE bool decide_copied(WideRayJob<S>& job, std::uint32_t begin, std::uin
   constexpr std::uint32_t n = lanes<S> < row ? lanes<S> : row;
   for (std::uint32_t first = 0; first < count; first += n) {
     const std::uint32_t here = count - first < n ? count - first : n;
-    unsigned open = (may_meet<S, n>(*job.ray, corners + first, row) | unusual >> first) & ((2U << (here - 1)) - 1);
-    for (; open != 0; open &= open - 1)
-      if (job.decide(job.context, job.entries[begin + first + unsigned(__builtin_ctz(open))])) return true;
+    unsigned open =
+        (may_meet<S, n>(*job.ray, corners + first, row) | unusual >> first) & ((2U << (here - 1)) - 1);
+    for (; open != 0; open &= open - 1) {
+      const std::uint32_t k = first + unsigned(__builtin_ctz(open));
+      S own[9];
+      for (std::size_t place = 0; place < 9; ++place) own[place] = corners[place * row + k];
+      const bool triangle = (unusual >> k & 1) == 0;
+      if (job.decide(job.context, job.entries[begin + k], triangle ? own : nullptr)) return true;
+    }
   }
   return false;
 }
@@ -236,7 +243,7 @@ KBVH_INLINE bool decide_leaf(WideRayJob<S>& job, std::uint32_t leaf) {
   const std::uint32_t begin = job.first_entry[leaf], count = job.end_entry[leaf] - begin;
   if (job.offsets == nullptr || count < 2 || job.ray->steepness == 0) {
     for (std::uint32_t entry = begin; entry < begin + count; ++entry)
-      if (job.decide(job.context, job.entries[entry])) return true;
+      if (job.decide(job.context, job.entries[entry], nullptr)) return true;
     return false;
   }
   job.tests += count;  // added at once: the same with registers of any width
@@ -272,9 +279,7 @@ void follow(WideRayJob<S>& job) {
     std::uint32_t item = top.item;
     for (;;) {  // down, as long as there is one child that is nearest
       if ((item & WidePair::leaf_bit) != 0) {
-        const LeafSlot slot{item & ~WidePair::leaf_bit};
-        const std::uint32_t leaf = job.tree.nodes[slot.node()].first_leaf + slot.lane();
-        job.over = decide_leaf(job, leaf);
+        job.over = decide_leaf(job, item & ~WidePair::leaf_bit);
         if (job.over) return;
         reach = reach_of(ray);
         break;
@@ -286,7 +291,7 @@ void follow(WideRayJob<S>& job) {
                      ((1U << node.count) - 1);
       job.tests += node.count;
       const auto child = [&](std::uint32_t lane) {
-        return lane < node.leaf_count ? WidePair::leaf_bit | LeafSlot::of(item, lane)
+        return lane < node.leaf_count ? WidePair::leaf_bit | (node.first_leaf + lane)
                                       : node.first_child + lane - node.leaf_count;
       };
       if (hit == 0) break;

@@ -29,7 +29,8 @@ struct WideLeafCopy {
   std::uint32_t unusual = 0;  ///< bit k: entry k is no triangle, and its copy is of its first corner only
 };
 
-/// A node, or a leaf as in `WidePair`, and the parameter at which the ray enters it.
+/// A node, or with `WidePair::leaf_bit` a leaf, numbered as by `WideNode::first_leaf`; and the parameter at
+/// which the ray enters it.
 template <class S>
 struct WideRayItem {
   S near;
@@ -56,14 +57,16 @@ struct WideRayJob {
   /// [leaf][corner][axis][row]: the corners of leaves that a ray has reached, copied at the first one; null:
   /// each ray reads them from `positions`.
   S* copied;
-  WideLeafCopy* copies;  ///< [leaf]
-  std::uint32_t stamp;   ///< of the copies that are current
+  WideLeafCopy* copies;       ///< [leaf]
+  std::uint32_t stamp;        ///< of the copies that are current
   const std::uint8_t* stale;  ///< [node]: not 0 while its children's boxes must be made; null: none
   WideRayItem<S>* stack;
   std::size_t depth, room;
   void* context;
-  void (*make)(void* context, std::uint32_t node);         ///< makes the boxes of a node's children
-  bool (*decide)(void* context, std::uint32_t primitive);  ///< may lower the limit; true ends the search
+  void (*make)(void* context, std::uint32_t node);  ///< makes the boxes of a node's children
+  /// Decides a primitive; may lower the limit; true ends the search. `corners`, [3][3], are those of a
+  /// triangle; null: they have not been read.
+  bool (*decide)(void* context, std::uint32_t primitive, const S* corners);
   std::uint64_t tests;
   bool over;
 };
