@@ -15,6 +15,8 @@ constexpr double bodies_worn_out = 1.5;
 /// Corners are copied if there are at least this many rays for each leaf of a body: fewer rays meet too few
 /// leaves a second time.
 constexpr double rays_per_leaf = 0.25;
+/// Fewer rays of a block are followed one by one.
+constexpr int least_of_a_packet = 16;
 
 /// Returns a number of the scalar that is not below x.
 template <class S>
@@ -125,6 +127,7 @@ void WideRays<S>::prepare(std::size_t rays) {
     const Primitives& primitives = scene_.primitives(body);
     one.entered = false;
     one.search.kernel = wide_ray_kernels<S>(tree.kernels()).follow(tree.width());
+    one.search.together = wide_ray_kernels<S>(tree.kernels()).together(tree.width());
     WideRayJob<S>& job = one.search.job;
     job = job_in(*side.hierarchy);
     if (side.child_bounds != nullptr) job.tree.child_bounds = side.child_bounds;
@@ -153,7 +156,7 @@ void WideRays<S>::prepare(std::size_t rays) {
   all_bodies_.job = job_in(bodies_);
   all_bodies_.job.decide = [](void* context, std::uint32_t primitive, const S*) {
     auto& all = *static_cast<WideRays*>(context);
-    return all.enter(all.ids_[primitive]);
+    return all.follow(all.enter(all.ids_[primitive]).search, 0, all.stack_);
   };
 }
 
@@ -161,7 +164,7 @@ template <class S>
 WideRayJob<S> WideRays<S>::job_in(WideTree<S>& tree) {
   const WideLeafLists leaves = tree.leaf_lists();
   WideRayJob<S> job{};
-  job.ray = &ray_;
+  job.ray = rays_;
   job.tree = tree.arrays();
   job.first_entry = leaves.first_entry;
   job.end_entry = leaves.end_entry;
@@ -171,26 +174,87 @@ WideRayJob<S> WideRays<S>::job_in(WideTree<S>& tree) {
 }
 
 template <class S>
-bool WideRays<S>::follow(Traversal& search, std::vector<WideRayItem<S>>& stack) {
+bool WideRays<S>::follow(Traversal& search, std::uint32_t from, std::vector<WideRayItem<S>>& stack) {
   WideRayJob<S>& job = search.job;
   if (stack.empty()) stack.resize(256);
-  stack[0] = {S(0), 0};
+  stack[0] = {S(0), from};
   job.depth = 1;
-  job.tests = 0;
   job.over = false;
   for (;;) {
     job.stack = stack.data();
     job.room = stack.size();
     search.kernel(job);
-    if (job.depth == 0 || job.over) break;
+    if (job.depth == 0 || job.over) return job.over;
     stack.resize(2 * stack.size());
   }
-  tests_ += job.tests;
-  return job.over;
 }
 
 template <class S>
-bool WideRays<S>::enter(std::uint32_t body) {
+bool WideRays<S>::pack(std::span<const Ray<S>> rays, std::uint64_t met) {
+  if (ids_.size() != 1 || std::popcount(met) < least_of_a_packet) return false;
+  const Ray<S>& one = rays[std::size_t(std::countr_zero(met))];
+  for (std::uint64_t left = met; left != 0; left &= left - 1)
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const S direction = rays[std::size_t(std::countr_zero(left))].direction[axis];
+      if (!(std::abs(direction) >= 4 * std::numeric_limits<S>::min()) ||
+          std::signbit(direction) != std::signbit(one.direction[axis]))
+        return false;
+    }
+  constexpr S infinity = std::numeric_limits<S>::infinity();
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    packet_.least_add[axis] = packet_.least_scale[axis] = infinity;
+    packet_.most_add[axis] = packet_.most_scale[axis] = -infinity;
+  }
+  for (std::size_t i = 0; i < WideRayPacket<S>::size; ++i) {
+    const bool followed = (met >> i & 1) != 0;
+    if (followed) rays_[i] = wide_ray(rays[i]);
+    packet_.limit[i] = followed ? rays_[i].limit : S(-1);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const S add = packet_.add[axis][i] = followed ? rays_[i].add[axis] : S(0);
+      const S scale = packet_.scale[axis][i] = followed ? rays_[i].scale[axis] : S(1);
+      if (!followed) continue;
+      packet_.least_add[axis] = std::min(packet_.least_add[axis], add);
+      packet_.most_add[axis] = std::max(packet_.most_add[axis], add);
+      packet_.least_scale[axis] = std::min(packet_.least_scale[axis], scale);
+      packet_.most_scale[axis] = std::max(packet_.most_scale[axis], scale);
+    }
+  }
+  const WideRay<S>& first = rays_[std::countr_zero(met)];
+  std::copy_n(first.enter_row, 3, packet_.enter_row);
+  std::copy_n(first.leave_row, 3, packet_.leave_row);
+  packet_.searching = std::uint32_t(std::popcount(met));
+  packet_.rays = rays_;
+  return true;
+}
+
+template <class S>
+void WideRays<S>::follow_packet() {
+  Traversal& search = enter(ids_[0]).search;
+  work_[ids_[0]].rays += packet_.searching - 1;
+  if (packet_stack_.empty()) packet_stack_.resize(256);
+  WidePacketJob<S> job{};
+  job.single = &search.job;
+  job.packet = &packet_;
+  packet_stack_[0] = {S(0), 0, WidePacketItem<S>::no_box};
+  job.depth = 1;
+  while (job.depth > 0) {
+    if (job.depth + max_items_per_step > packet_stack_.size()) packet_stack_.resize(2 * packet_stack_.size());
+    job.stack = packet_stack_.data();
+    job.room = packet_stack_.size();
+    search.together(job);
+    for (; job.alone != 0; job.alone &= job.alone - 1) {
+      const auto i = std::size_t(std::countr_zero(job.alone));
+      search.job.ray = rays_ + i;
+      const bool over = follow(search, job.item, stack_);
+      packet_.limit[i] = over ? S(-1) : rays_[i].limit;
+      packet_.searching -= over ? 1U : 0U;
+    }
+  }
+  search.job.ray = rays_;
+}
+
+template <class S>
+auto WideRays<S>::enter(std::uint32_t body) -> OfBody& {
   OfBody& one = of_bodies_[body];
   if (!one.entered) {
     one.entered = true;
@@ -198,21 +262,21 @@ bool WideRays<S>::enter(std::uint32_t body) {
     one.search.job.positions = motion_.positions(body);
   }
   body_ = body;
-  const bool over = follow(one.search, stack_);
-  work_[body].tests += one.search.job.tests;
   ++work_[body].rays;
-  return over;
+  return one;
 }
 
 template <class S>
 bool WideRays<S>::decide(std::uint32_t primitive, const S* corners) {
   static constexpr std::uint32_t in_order[3] = {0, 1, 2};
-  const double limit = search_->limit();
+  WideRay<S>& ray = *of_bodies_[body_].search.job.ray;
+  RaySearch<S>& search = *searches_[&ray - rays_];
+  const double limit = search.limit();
   const bool over = corners != nullptr
-                        ? search_->offer(body_, primitive, PolygonTriangles(in_order), corners, *stats_)
-                        : search_->offer(body_, primitive, scene_.primitives(body_).triangles(primitive),
-                                         motion_.positions(body_), *stats_);
-  if (search_->limit() != limit) ray_.limit = at_least<S>(search_->limit());
+                        ? search.offer(body_, primitive, PolygonTriangles(in_order), corners, *stats_)
+                        : search.offer(body_, primitive, scene_.primitives(body_).triangles(primitive),
+                                       motion_.positions(body_), *stats_);
+  if (search.limit() != limit) ray.limit = at_least<S>(search.limit());
   return over;
 }
 
@@ -251,20 +315,35 @@ void WideRays<S>::answer(const RayProbes<S>& asked, std::span<const WideProbeSid
     const std::size_t count = std::min(rays.size() - begin, WideRayBlock<S>::size);
     std::uint64_t met = screen(rays.subspan(begin, count));
     std::fill_n(asked.hits.begin() + std::ptrdiff_t(begin), count, RayHit{});
+    if (pack(rays.subspan(begin, count), met)) {
+      packet_searches_.clear();
+      packet_searches_.reserve(WideRayBlock<S>::size);
+      for (std::uint64_t left = met; left != 0; left &= left - 1) {
+        const auto i = std::size_t(std::countr_zero(left));
+        packet_searches_.push_back(asked.search(begin + i));
+        searches_[i] = &packet_searches_.back();
+      }
+      follow_packet();
+      for (; met != 0; met &= met - 1) {
+        const auto i = std::size_t(std::countr_zero(met));
+        asked.take(begin + i, *searches_[i]);
+      }
+      continue;
+    }
     for (; met != 0; met &= met - 1) {
       const std::size_t i = begin + std::size_t(std::countr_zero(met));
       RaySearch<S> search = asked.search(i);
-      search_ = &search;
-      ray_ = wide_ray(rays[i]);
+      searches_[0] = &search;
+      rays_[0] = wide_ray(rays[i]);
       if (ids_.size() == 1)
-        enter(ids_[0]);
+        follow(enter(ids_[0]).search, 0, stack_);
       else
-        follow(all_bodies_, body_stack_);
+        follow(all_bodies_, 0, body_stack_);
       asked.take(i, search);
     }
   }
-  search_ = nullptr;
-  tests += tests_;
+  for (const std::uint32_t body : ids_) tests_ += work_[body].tests = of_bodies_[body].search.job.tests;
+  tests += tests_ + all_bodies_.job.tests;
 }
 
 template <class S>
@@ -289,7 +368,9 @@ std::size_t WideRays<S>::bytes() const {
                       (primitives_.offsets.capacity() + primitives_.vertices.capacity() + ids_.capacity()) *
                           sizeof(std::uint32_t) +
                       corners_.capacity() * sizeof(S) + of_bodies_.capacity() * sizeof(OfBody) +
-                      (body_stack_.capacity() + stack_.capacity()) * sizeof(WideRayItem<S>);
+                      (body_stack_.capacity() + stack_.capacity()) * sizeof(WideRayItem<S>) +
+                      packet_stack_.capacity() * sizeof(WidePacketItem<S>) +
+                      packet_searches_.capacity() * sizeof(RaySearch<S>);
   for (const OfBody& one : of_bodies_)
     total += one.corners.capacity() * sizeof(S) + one.copies.capacity() * sizeof(WideLeafCopy);
   return total;

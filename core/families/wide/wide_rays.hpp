@@ -34,6 +34,7 @@ class WideRays {
   struct Traversal {
     WideRayJob<S> job{};
     typename WideRayKernels<S>::Follow kernel = nullptr;
+    typename WideRayKernels<S>::Together together = nullptr;
   };
   struct OfBody {
     Traversal search;
@@ -49,12 +50,17 @@ class WideRays {
   WideRayJob<S> job_in(WideTree<S>& tree);
   /// Returns bit i unless rays[i] certainly misses all bodies; takes at most as many rays as a block has.
   std::uint64_t screen(std::span<const Ray<S>> rays);
-  /// Follows the current ray through a tree. Returns whether the search has ended.
-  bool follow(Traversal& search, std::vector<WideRayItem<S>>& stack);
-  /// Follows the current ray through one body. Returns whether the search has ended.
-  bool enter(std::uint32_t body);
-  /// Decides a primitive of the current body for the current ray; `corners`, [3][3], are those of a triangle,
-  /// or null. Returns whether the search has ended.
+  /// Makes a packet of the rays of a block that are `met`; they may be followed together only if this returns
+  /// true: if their directions have the same signs, and can be inverted.
+  bool pack(std::span<const Ray<S>> rays, std::uint64_t met);
+  /// Follows the job's ray through a tree, from a node or leaf. Returns whether the search has ended.
+  bool follow(Traversal& search, std::uint32_t from, std::vector<WideRayItem<S>>& stack);
+  /// Follows the packet through the only body.
+  void follow_packet();
+  /// Prepares a body for a ray that enters it.
+  OfBody& enter(std::uint32_t body);
+  /// Decides a primitive of the current body for the ray of its job; `corners`, [3][3], are those of a
+  /// triangle, or null. Returns whether the search has ended.
   bool decide(std::uint32_t primitive, const S* corners);
 
   SceneView<S> scene_;
@@ -73,10 +79,13 @@ class WideRays {
   std::uint32_t stamp_ = 0;        ///< of this call's copies
   std::vector<WideRayItem<S>> body_stack_, stack_;
   WideRayBlock<S> block_{};
-  // The current ray.
-  WideRay<S> ray_{};
-  RaySearch<S>* search_ = nullptr;
-  std::uint32_t body_ = 0;
+  WideRayPacket<S> packet_{};
+  std::vector<WidePacketItem<S>> packet_stack_;
+  // The rays that are followed: those of a packet, by place in the block, or the first one.
+  WideRay<S> rays_[WideRayBlock<S>::size];
+  RaySearch<S>* searches_[WideRayBlock<S>::size] = {};
+  std::vector<RaySearch<S>> packet_searches_;
+  std::uint32_t body_ = 0;  ///< in which they are
   TriangleTestStats* stats_ = nullptr;
   std::uint64_t tests_ = 0;
 };

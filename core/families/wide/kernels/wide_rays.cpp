@@ -239,7 +239,7 @@ KBVH_INLINE bool decide_copied(WideRayJob<S>& job, std::uint32_t begin, std::uin
 
 /// Decides the primitives of a leaf that the ray may meet. Returns whether the search has ended.
 template <class S>
-KBVH_INLINE bool decide_leaf(WideRayJob<S>& job, std::uint32_t leaf) {
+[[gnu::noinline]] bool decide_leaf(WideRayJob<S>& job, std::uint32_t leaf) {
   const std::uint32_t begin = job.first_entry[leaf], count = job.end_entry[leaf] - begin;
   if (job.offsets == nullptr || count < 2 || job.ray->steepness == 0) {
     for (std::uint32_t entry = begin; entry < begin + count; ++entry)
@@ -324,8 +324,123 @@ void follow(WideRayJob<S>& job) {
   }
 }
 
+// ---- Packets
+// -----------------------------------------------------------------------------------------------
+
+/// Rays go on alone from a node that no more of them enter.
+constexpr int most_alone = 3;
+
+/// Returns the largest limit of a packet's rays.
 template <class S>
-constexpr WideRayKernels<S> table{&follow<S, 2>, &follow<S, 4>, &follow<S, 8>, &screen<S>};
+KBVH_INLINE S largest_limit(const WideRayPacket<S>& packet) {
+  using V = Values<S>;
+  V most = load_lanes<V>(packet.limit);
+  for (std::size_t i = lanes<S>; i < packet.size; i += lanes<S>)
+    most = larger(load_lanes<V>(packet.limit + i), most);
+  S one[lanes<S>];
+  store_lanes<V>(one, most);
+  for (std::size_t i = 1; i < lanes<S>; ++i) one[0] = larger(one[i], one[0]);
+  return one[0];
+}
+
+/// Does the same as `entered` for all rays of a packet: bit i is set unless each ray certainly misses the box
+/// of lane i. Sums, differences and products of numbers are monotone, rounded or not, so that those of the
+/// smallest and largest numbers bound those of all rays.
+template <class S, std::size_t width>
+KBVH_INLINE unsigned entered_by_any(const S* rows, const WideRayPacket<S>& packet, S* near) {
+  constexpr std::size_t fit = native_lanes<S> < width ? native_lanes<S> : width;
+  constexpr std::size_t lanes = fit * sizeof(S) < 16 ? 1 : fit;
+  using V = Vector<S, lanes>;
+  const S limit = largest_limit(packet);
+  unsigned missed = 0;
+  for (std::size_t i = 0; i < width; i += lanes) {
+    V first = V{} + S(0), last = V{} + limit;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const V to = load_lanes<V>(rows + packet.enter_row[axis] * width + i) + packet.least_add[axis];
+      const V past = packet.most_add[axis] - load_lanes<V>(rows + packet.leave_row[axis] * width + i);
+      first = larger(smaller(to * packet.least_scale[axis], to * packet.most_scale[axis]), first);
+      last = smaller(larger(past * packet.least_scale[axis], past * packet.most_scale[axis]), last);
+    }
+    first = smaller(first, V{} + Slack<S>::largest);
+    store_lanes<V>(near + i, first);
+    missed |= above<V>(first, last * Slack<S>::grow + Slack<S>::least) << i;
+  }
+  return ~missed;
+}
+
+/// Returns bit i unless ray i of a packet certainly misses a box, or is not followed.
+template <class S>
+KBVH_INLINE std::uint64_t entering(const WideRayPacket<S>& packet, const S* rows, std::size_t width) {
+  using V = Values<S>;
+  std::uint64_t missed = 0;
+  for (std::size_t i = 0; i < packet.size; i += lanes<S>) {
+    V first{}, last = load_lanes<V>(packet.limit + i);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const V add = load_lanes<V>(packet.add[axis] + i), scale = load_lanes<V>(packet.scale[axis] + i);
+      first = larger((add + rows[packet.enter_row[axis] * width]) * scale, first);
+      last = smaller((add - rows[packet.leave_row[axis] * width]) * scale, last);
+    }
+    first = smaller(first, V{} + Slack<S>::largest);
+    missed |= std::uint64_t(above<V>(first, last * Slack<S>::grow + Slack<S>::least)) << i;
+  }
+  return ~missed;
+}
+
+template <class S, std::uint32_t width>
+void together(WidePacketJob<S>& job) {
+  WideRayJob<S>& single = *job.single;
+  WideRayPacket<S>& packet = *job.packet;
+  const S* const bounds = single.tree.child_bounds;
+  job.alone = 0;
+  while (job.depth > 0 && job.depth + max_items_per_step <= job.room) {
+    const WidePacketItem<S> top = job.stack[--job.depth];
+    const std::size_t parent = top.box == top.no_box ? 0 : top.box / 8;
+    const S* const box = bounds + parent * lane_scalars(width) + top.box % 8;
+    std::uint64_t active = 0;
+    if (top.box != top.no_box) {
+      active = entering(packet, box, width);
+      single.tests += packet.searching;
+    } else {
+      for (std::size_t i = 0; i < packet.size; ++i) active |= std::uint64_t(packet.limit[i] >= 0) << i;
+    }
+    if (active == 0) continue;
+    if ((top.item & WidePair::leaf_bit) != 0) {
+      for (; active != 0; active &= active - 1) {
+        const auto i = unsigned(__builtin_ctzll(active));
+        single.ray = packet.rays + i;
+        const bool over = decide_leaf(single, top.item & ~WidePair::leaf_bit);
+        packet.limit[i] = over ? S(-1) : single.ray->limit;
+        packet.searching -= over ? 1U : 0U;
+      }
+      continue;
+    }
+    if (__builtin_popcountll(active) <= most_alone) {
+      job.alone = active;
+      job.item = top.item;
+      return;
+    }
+    if (single.stale != nullptr && single.stale[top.item] != 0) single.make(single.context, top.item);
+    const WideNode node = single.tree.nodes[top.item];
+    alignas(64) S near[width];
+    unsigned hit = entered_by_any<S, width>(bounds + top.item * lane_scalars(width), packet, near) &
+                   ((1U << node.count) - 1);
+    single.tests += node.count;
+    WidePacketItem<S>* const bottom = job.stack + job.depth;
+    for (; hit != 0; hit &= hit - 1) {
+      const auto lane = std::uint32_t(__builtin_ctz(hit));
+      WidePacketItem<S>* place = job.stack + job.depth++;
+      for (; place > bottom && place[-1].near < near[lane]; --place) *place = place[-1];
+      *place = {near[lane],
+                lane < node.leaf_count ? WidePair::leaf_bit | (node.first_leaf + lane)
+                                       : node.first_child + lane - node.leaf_count,
+                top.item * 8 + lane};
+    }
+  }
+}
+
+template <class S>
+constexpr WideRayKernels<S> table{&follow<S, 2>,   &follow<S, 4>,   &follow<S, 8>, &together<S, 2>,
+                                  &together<S, 4>, &together<S, 8>, &screen<S>};
 
 }  // namespace
 

@@ -80,6 +80,38 @@ struct WideRayBlock {
   alignas(64) S origin[3][size], direction[3][size], length[size];
 };
 
+/// Rays of a block that enter each box through the same sides, to be followed together.
+template <class S>
+struct WideRayPacket {
+  static constexpr std::size_t size = WideRayBlock<S>::size;
+  /// As in `WideRay`, and finite. A negative limit: the ray is not followed, or its search has ended.
+  alignas(64) S add[3][size], scale[3][size], limit[size];
+  S least_add[3], most_add[3], least_scale[3], most_scale[3];
+  std::uint32_t enter_row[3], leave_row[3];
+  std::uint32_t searching;  ///< the number of rays without a negative limit
+  WideRay<S>* rays;         ///< [size]
+};
+
+/// A node or a leaf as in `WideRayItem`, and where its box is.
+template <class S>
+struct WidePacketItem {
+  static constexpr std::uint32_t no_box = ~std::uint32_t(0);
+  S near;  ///< no ray enters it before
+  std::uint32_t item;
+  std::uint32_t box;  ///< 8 * parent + lane; no_box: all rays enter it
+};
+
+/// A packet in one hierarchy: a traversal that can pause and resume.
+template <class S>
+struct WidePacketJob {
+  WideRayJob<S>* single;  ///< for the rays one by one
+  WideRayPacket<S>* packet;
+  WidePacketItem<S>* stack;
+  std::size_t depth, room;
+  std::uint64_t alone;  ///< set on return: rays that go on alone
+  std::uint32_t item;   ///< from this item
+};
+
 /// Follows rays, nearer children first. Boxes are closed and tested conservatively: an item is left out only
 /// if the ray certainly misses its box within the limit. A filter leaves out primitives of three corners that
 /// the ray certainly misses; the caller decides all others.
@@ -89,6 +121,13 @@ struct WideRayKernels {
   using Follow = void (*)(WideRayJob<S>& job);
   Follow width2, width4, width8;
   Follow follow(std::uint32_t width) const { return width == 2 ? width2 : width == 4 ? width4 : width8; }
+  /// Follows the rays of a packet until the stack is empty, a step might exceed the free space, or so few
+  /// rays enter a node that they are faster one by one.
+  using Together = void (*)(WidePacketJob<S>& job);
+  Together together2, together4, together8;
+  Together together(std::uint32_t width) const {
+    return width == 2 ? together2 : width == 4 ? together4 : together8;
+  }
   /// Returns bit i unless ray i of a block certainly misses all of the first `count` boxes of a node of
   /// width 8.
   using Screen = std::uint64_t (*)(const WideRayBlock<S>& rays, const S* child_bounds, std::uint32_t count);
