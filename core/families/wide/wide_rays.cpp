@@ -151,6 +151,7 @@ void WideRays<S>::prepare(std::size_t rays) {
     job.copies = one.copies.data();
     job.copied = one.corners.data();
   }
+  all_bodies_.job = {};
   if (ids_.empty()) return;
   all_bodies_.kernel = wide_ray_kernels<S>(bodies_.kernels()).follow(bodies_.width());
   all_bodies_.job = job_in(bodies_);

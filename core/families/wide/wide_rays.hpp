@@ -82,7 +82,7 @@ class WideRays {
   WideRayPacket<S> packet_{};
   std::vector<WidePacketItem<S>> packet_stack_;
   // The rays that are followed: those of a packet, by place in the block, or the first one.
-  WideRay<S> rays_[WideRayBlock<S>::size];
+  WideRay<S> rays_[WideRayBlock<S>::size] = {};
   RaySearch<S>* searches_[WideRayBlock<S>::size] = {};
   std::vector<RaySearch<S>> packet_searches_;
   std::uint32_t body_ = 0;  ///< in which they are
