@@ -25,6 +25,8 @@ S at_least(double x) {
   return double(rounded) < x ? std::nextafter(rounded, std::numeric_limits<S>::infinity()) : rounded;
 }
 
+/// Returns a ray in the form that the traversal reads. Without branches that depend on its direction, which
+/// no processor would predict.
 template <class S>
 WideRay<S> wide_ray(const Ray<S>& ray) {
   WideRay<S> wide{};
@@ -34,24 +36,26 @@ WideRay<S> wide_ray(const Ray<S>& ray) {
     // Too small to be inverted: the axis rejects nothing (see RaySlabs).
     if (direction != 0 && std::isinf(inverse)) inverse = std::numeric_limits<S>::quiet_NaN();
     // Rows hold lower, and upper with the other sign.
-    const bool back = std::signbit(inverse);
-    wide.enter_row[axis] = back ? axis + 3 : axis;
-    wide.leave_row[axis] = back ? axis : axis + 3;
-    wide.add[axis] = back ? ray.origin[axis] : -ray.origin[axis];
-    wide.scale[axis] = back ? -inverse : inverse;
+    const std::uint32_t back = std::signbit(inverse) ? 3 : 0;
+    wide.enter_row[axis] = axis + back;
+    wide.leave_row[axis] = axis + 3 - back;
+    wide.add[axis] = -std::copysign(S(1), inverse) * ray.origin[axis];
+    wide.scale[axis] = std::abs(inverse);
   }
   wide.limit = ray.length;
-  std::uint32_t along = 0;
-  for (std::uint32_t axis = 1; axis < 3; ++axis)
-    if (std::abs(ray.direction[axis]) > std::abs(ray.direction[along])) along = axis;
-  const S steep = ray.direction[along];
-  wide.steepness = std::abs(steep);
-  wide.sign = std::signbit(steep) ? S(-1) : S(1);
+  const S size[3] = {std::abs(ray.direction[0]), std::abs(ray.direction[1]), std::abs(ray.direction[2])};
+  std::uint32_t along = size[1] > size[0] ? 1 : 0;
+  along = size[2] > std::max(size[0], size[1]) ? 2 : along;
+  constexpr std::uint32_t cyclic[5] = {0, 1, 2, 0, 1};
   for (std::uint32_t k = 0; k < 3; ++k) {
-    wide.axes[k] = (along + 1 + k) % 3;
+    wide.axes[k] = cyclic[(along + 1) % 3 + k];
     wide.origin[k] = ray.origin[wide.axes[k]];
-    if (k < 2 && steep != 0) wide.shear[k] = ray.direction[wide.axes[k]] / steep;
   }
+  const S steep = ray.direction[along];
+  wide.steepness = size[along];
+  wide.sign = std::copysign(S(1), steep);
+  if (steep != 0)
+    for (std::uint32_t k = 0; k < 2; ++k) wide.shear[k] = ray.direction[wide.axes[k]] / steep;
   return wide;
 }
 
