@@ -251,8 +251,9 @@ void register_all() {
     RegisterBenchmark(("overlap/" + set).c_str(), [=](benchmark::State& state) { overlap(state, kernels); });
     for (const auto& [order, word] :
          {std::pair(RayOrder::rows, "rows"), {RayOrder::tiles, "tiles"}, {RayOrder::random, "random"}})
-      RegisterBenchmark(("rays/" + set + "/" + word).c_str(),
-                        [=](benchmark::State& state) { closest_hits(state, order, kernels); });
+      RegisterBenchmark(
+          ("rays/" + set + "/" + word).c_str(),
+          [order = order, kernels](benchmark::State& state) { closest_hits(state, order, kernels); });
   }
   for (const BuildMethod method : {BuildMethod::median, BuildMethod::sah, BuildMethod::morton})
     RegisterBenchmark((std::string("build/") + name(method)).c_str(),
