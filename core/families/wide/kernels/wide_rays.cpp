@@ -194,15 +194,16 @@ template <class S>
       }
     }
     const auto store = [&](std::size_t place, const Values<S>& values) {
+      constexpr std::size_t n = lanes<S>;
       S* const at = to + place * row + first;
-      if (row >= lanes<S>) {
+      if (row >= n) {
         store_lanes(at, values);
         return;
       }
-      if constexpr (lanes < S >> 4) {
+      if constexpr (n > 4) {
         if (row == 4) __builtin_memcpy(at, &values, 4 * sizeof(S));
       }
-      if constexpr (lanes < S >> 8) {
+      if constexpr (n > 8) {
         if (row == 8) __builtin_memcpy(at, &values, 8 * sizeof(S));
       }
     };
