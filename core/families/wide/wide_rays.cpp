@@ -12,8 +12,8 @@ namespace {
 
 /// The tree over bodies is rebuilt when its boxes have grown by this factor.
 constexpr double bodies_worn_out = 1.5;
-/// Corners are copied if there are at least this many rays for each leaf of a body: fewer rays meet too few
-/// leaves a second time.
+/// Copies of corners are kept if there are at least this many rays for each leaf of a body: fewer rays meet
+/// too few leaves a second time.
 constexpr double rays_per_leaf = 0.25;
 /// Fewer rays of a block are followed one by one.
 constexpr int least_of_a_packet = 16;

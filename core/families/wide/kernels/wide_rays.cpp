@@ -238,35 +238,60 @@ KBVH_INLINE bool decide_copied(WideRayJob<S>& job, std::uint32_t begin, std::uin
   return false;
 }
 
-/// Decides the primitives of a leaf that the ray may meet. Returns whether the search has ended.
+/// The corners of a leaf, copied side by side.
 template <class S>
-[[gnu::noinline]] bool decide_leaf(WideRayJob<S>& job, std::uint32_t leaf) {
+struct LeafCorners {
+  const S* rows;
+  unsigned unusual;  ///< as in WideLeafCopy
+};
+
+template <class S>
+KBVH_INLINE bool is_copied(const WideRayJob<S>& job, std::uint32_t leaf) {
+  return job.copied != nullptr && job.copies[leaf].stamp == job.stamp;
+}
+template <class S>
+KBVH_INLINE S* place_of_copy(const WideRayJob<S>& job, std::uint32_t leaf) {
+  return job.copied + std::size_t(9) * job.row * leaf;
+}
+
+/// Returns the corners of a leaf: those that are kept for the rays of the call, or copied to `own`.
+template <class S>
+KBVH_INLINE LeafCorners<S> corners_of(const WideRayJob<S>& job, std::uint32_t leaf, S* own) {
+  if (is_copied(job, leaf)) return {place_of_copy(job, leaf), job.copies[leaf].unusual};
+  return {own, copy_corners(job, job.first_entry[leaf], job.end_entry[leaf], own)};
+}
+/// Keeps a copy of a leaf's corners for the other rays of the call.
+template <class S>
+KBVH_INLINE void keep_corners(const WideRayJob<S>& job, std::uint32_t leaf) {
+  if (job.copied == nullptr || is_copied(job, leaf)) return;
+  job.copies[leaf] = {
+      job.stamp, copy_corners(job, job.first_entry[leaf], job.end_entry[leaf], place_of_copy(job, leaf))};
+}
+
+/// Returns whether the entries of a leaf are decided without a filter: there is only one, or it is a body.
+template <class S>
+KBVH_INLINE bool unfiltered(const WideRayJob<S>& job, std::uint32_t leaf) {
+  return job.offsets == nullptr || job.end_entry[leaf] - job.first_entry[leaf] < 2;
+}
+
+/// Decides the entries of a leaf that the ray may meet; without corners, all of them. Returns whether the
+/// search has ended.
+template <class S>
+[[gnu::noinline]] bool decide_leaf(WideRayJob<S>& job, std::uint32_t leaf, LeafCorners<S> corners) {
   const std::uint32_t begin = job.first_entry[leaf], count = job.end_entry[leaf] - begin;
-  if (job.offsets == nullptr || count < 2 || job.ray->steepness == 0) {
+  if (corners.rows == nullptr || job.ray->steepness == 0) {
     for (std::uint32_t entry = begin; entry < begin + count; ++entry)
       if (job.decide(job.context, job.entries[entry], nullptr)) return true;
     return false;
   }
   job.tests += count;  // added at once: the same with registers of any width
-  alignas(64) S own[9 * 16];
-  const S* corners = own;
-  unsigned unusual = 0;
-  if (job.copied == nullptr) {
-    unusual = copy_corners(job, begin, begin + count, own);
-  } else {
-    S* const kept = job.copied + std::size_t(9) * job.row * leaf;
-    WideLeafCopy& copy = job.copies[leaf];
-    if (copy.stamp != job.stamp) copy = {job.stamp, copy_corners(job, begin, begin + count, kept)};
-    unusual = copy.unusual;
-    corners = kept;
-  }
   switch (job.row) {
     case 4:
-      return decide_copied<S, 4>(job, begin, count, corners, unusual);
+      return decide_copied<S, 4>(job, begin, count, corners.rows, corners.unusual);
     case 8:
-      return decide_copied<S, 8>(job, begin, count, corners, unusual);
+      return decide_copied<S, 8>(job, begin, count, corners.rows, corners.unusual);
     default:
-      return decide_copied<S, 16>(job, begin, count, corners, unusual);
+      return decide_copied<S, 16>(job, begin, count, corners.rows, corners.unusual);
   }
 }
 
@@ -280,7 +305,14 @@ void follow(WideRayJob<S>& job) {
     std::uint32_t item = top.item;
     for (;;) {  // down, as long as there is one child that is nearest
       if ((item & WidePair::leaf_bit) != 0) {
-        job.over = decide_leaf(job, item & ~WidePair::leaf_bit);
+        const std::uint32_t leaf = item & ~WidePair::leaf_bit;
+        alignas(64) S own[9 * 16];
+        LeafCorners<S> corners{nullptr, 0};
+        if (!unfiltered(job, leaf)) {
+          keep_corners(job, leaf);
+          corners = corners_of(job, leaf, own);
+        }
+        job.over = decide_leaf(job, leaf, corners);
         if (job.over) return;
         reach = reach_of(ray);
         break;
@@ -329,7 +361,7 @@ void follow(WideRayJob<S>& job) {
 // -----------------------------------------------------------------------------------------------
 
 /// Rays go on alone from a node that no more of them enter.
-constexpr int most_alone = 3;
+constexpr int most_alone = 8;
 
 /// Returns the largest limit of a packet's rays.
 template <class S>
@@ -406,10 +438,15 @@ void together(WidePacketJob<S>& job) {
     }
     if (active == 0) continue;
     if ((top.item & WidePair::leaf_bit) != 0) {
+      // The rays of the packet share the leaf: the next packet seldom returns to it.
+      const std::uint32_t leaf = top.item & ~WidePair::leaf_bit;
+      alignas(64) S own[9 * 16];
+      const LeafCorners<S> corners =
+          unfiltered(single, leaf) ? LeafCorners<S>{nullptr, 0} : corners_of(single, leaf, own);
       for (; active != 0; active &= active - 1) {
         const auto i = unsigned(__builtin_ctzll(active));
         single.ray = packet.rays + i;
-        const bool over = decide_leaf(single, top.item & ~WidePair::leaf_bit);
+        const bool over = decide_leaf(single, leaf, corners);
         packet.limit[i] = over ? S(-1) : single.ray->limit;
         packet.searching -= over ? 1U : 0U;
       }
