@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <tuple>
 
@@ -10,9 +11,9 @@
 namespace kbvh::experiments::loop {
 namespace {
 
-FourPoints points_of(const ContactFinder::Pair& pair, const Positions& x) {
+FourPoints points_of(const std::uint32_t (&vertices)[4], const Positions& x) {
   FourPoints points;
-  for (int i = 0; i < 4; ++i) points.col(i) = x.row(pair.vertices[i]).transpose();
+  for (int i = 0; i < 4; ++i) points.col(i) = x.row(vertices[i]).transpose();
   return points;
 }
 
@@ -73,7 +74,7 @@ double ImplicitStep::collect(const Positions& x, std::vector<Active>& found) {
   bool too_near = false;
   const double most = barrier_.radius() * barrier_.radius();
   finder_.for_each([&](const ContactFinder::Pair& pair) {
-    const FourPoints points = points_of(pair, x);
+    const FourPoints points = points_of(pair.vertices, x);
     const double squared = closest_points(pair.kind, points).squared_distance;
     if (squared >= most) return;
     const double energy = pair_energy(barrier_, pair.kind, points, fading_of(pair));
@@ -100,7 +101,8 @@ double ImplicitStep::energy(const Positions& x, std::vector<Active>& found) {
   for (Eigen::Index v = 0; v < x.rows(); ++v)
     inertia += 0.5 * mesh.mass[std::size_t(v)] * (x.row(v) - free_.row(v)).squaredNorm();
   const double h = scene_.physics.time_step;
-  return inertia + h * h * (spring_energy(mesh, x) + hinge_energy(mesh, x) + collect(x, found));
+  return inertia +
+         h * h * (spring_energy(mesh, x) + hinge_energy(mesh, x) + energy_of_friction(x) + collect(x, found));
 }
 
 void ImplicitStep::assemble(const Positions& x) {
@@ -115,16 +117,46 @@ void ImplicitStep::assemble(const Positions& x) {
   add_hinges(mesh, x, h * h, system_);
   PairForce force;
   for (const Active& active : active_) {
-    pair_force(barrier_, active.pair.kind, points_of(active.pair, x), fading_of(active.pair),
+    pair_force(barrier_, active.pair.kind, points_of(active.pair.vertices, x), fading_of(active.pair),
                Curvature::positive, force);
-    for (int i = 0; i < 4; ++i) {
-      const std::uint32_t a = active.pair.vertices[i];
-      system_.add_gradient(a, h * h * force.gradient.segment<3>(3 * i));
-      system_.add_block(a, h * h * force.hessian.block<3, 3>(3 * i, 3 * i));
-      for (int j = 0; j < i; ++j)
-        system_.add_block(a, active.pair.vertices[j], h * h * force.hessian.block<3, 3>(3 * i, 3 * j));
-    }
+    add_pair(active.pair.vertices, force);
   }
+  for (const Rubbing& pair : rubbing_) {
+    friction_force(pair.friction, points_of(pair.vertices, x) - points_of(pair.vertices, begin_), force);
+    add_pair(pair.vertices, force);
+  }
+}
+
+void ImplicitStep::add_pair(const std::uint32_t (&vertices)[4], const PairForce& force) {
+  const double h = scene_.physics.time_step;
+  for (int i = 0; i < 4; ++i) {
+    system_.add_gradient(vertices[i], h * h * force.gradient.segment<3>(3 * i));
+    system_.add_block(vertices[i], h * h * force.hessian.block<3, 3>(3 * i, 3 * i));
+    for (int j = 0; j < i; ++j)
+      system_.add_block(vertices[i], vertices[j], h * h * force.hessian.block<3, 3>(3 * i, 3 * j));
+  }
+}
+
+void ImplicitStep::find_friction() {
+  rubbing_.clear();
+  const Physics& physics = scene_.physics;
+  if (physics.friction == 0) return;
+  for (const Active& active : active_) {
+    if (active.energy == 0) continue;
+    Rubbing pair;
+    std::copy(std::begin(active.pair.vertices), std::end(active.pair.vertices), pair.vertices);
+    pair.friction =
+        pair_friction(barrier_, active.pair.kind, points_of(pair.vertices, begin_), fading_of(active.pair),
+                      physics.friction, physics.slip_speed * physics.time_step);
+    rubbing_.push_back(pair);
+  }
+}
+
+double ImplicitStep::energy_of_friction(const Positions& x) const {
+  double sum = 0;
+  for (const Rubbing& pair : rubbing_)
+    sum += friction_energy(pair.friction, points_of(pair.vertices, x) - points_of(pair.vertices, begin_));
+  return sum;
 }
 
 StepReport ImplicitStep::advance(State& state) {
@@ -134,8 +166,10 @@ StepReport ImplicitStep::advance(State& state) {
   free_ = state.positions;
   for (std::uint32_t v = 0; v < mesh.vertex_count(); ++v)
     if (mesh.fixed[v] == 0) free_.row(v) += h * state.velocities.row(v) + h * h * physics.gravity.transpose();
-  x_ = state.positions;
+  x_ = begin_ = state.positions;
   finder_.look_at(x_);
+  collect(x_, active_);
+  find_friction();
   double present = energy(x_, active_);
   StepReport result;
   std::uint32_t evaluations = 0;
@@ -201,9 +235,9 @@ StepReport ImplicitStep::report(const State& state) const {
 }
 
 std::size_t ImplicitStep::bytes() const {
-  return system_.bytes() + sizeof(double) * std::size_t(5 * x_.size()) +
+  return system_.bytes() + sizeof(double) * std::size_t(6 * x_.size()) +
          (active_.capacity() + trial_active_.capacity()) * sizeof(Active) +
-         edge_lengths_.capacity() * sizeof(double);
+         rubbing_.capacity() * sizeof(Rubbing) + edge_lengths_.capacity() * sizeof(double);
 }
 
 }  // namespace kbvh::experiments::loop

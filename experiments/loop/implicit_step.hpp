@@ -4,6 +4,7 @@
 
 #include "experiments/loop/barrier.hpp"
 #include "experiments/loop/contact_finder.hpp"
+#include "experiments/loop/friction.hpp"
 #include "experiments/loop/newton_system.hpp"
 #include "experiments/loop/simulated_mesh.hpp"
 
@@ -40,7 +41,7 @@ struct StepReport {
 };
 
 /// Steps of implicit Euler in their variational form: the end of a step minimises
-///   sum of mass / 2 |x - x_free|^2 + time_step^2 (elastic energy + energy of the barriers),
+///   sum of mass / 2 |x - x_free|^2 + time_step^2 (elastic energy + energies of barriers and friction),
 /// where x_free is where vertices fly without forces but gravity. Newton's method with Hessians whose
 /// negative eigenvalues are set to zero pair by pair, spring by spring; a line search that never leaves the
 /// part of a direction that is free of impacts (Li et al. 2020, "Incremental Potential Contact"). All pairs
@@ -69,7 +70,10 @@ class ImplicitStep {
   /// Lists the pairs that repel each other, in an order of their ids. Returns the sum of their energies.
   double collect(const Positions& x, std::vector<Active>& found);
   double energy(const Positions& x, std::vector<Active>& found);
+  double energy_of_friction(const Positions& x) const;
   void assemble(const Positions& x);
+  void add_pair(const std::uint32_t (&vertices)[4], const PairForce& force);
+  void find_friction();
   Fading fading_of(const ContactFinder::Pair& pair) const;
   StepReport report(const State& state) const;
 
@@ -77,8 +81,13 @@ class ImplicitStep {
   ContactFinder& finder_;
   Barrier barrier_{};
   NewtonSystem system_;
-  Positions free_, x_, end_, trial_, direction_;
+  Positions begin_, free_, x_, end_, trial_, direction_;
   std::vector<Active> active_, trial_active_;
+  struct Rubbing {
+    std::uint32_t vertices[4];
+    PairFriction friction;
+  };
+  std::vector<Rubbing> rubbing_;      // pairs that repel each other at the begin of the step
   std::vector<double> edge_lengths_;  // [edge] at rest
 };
 

@@ -49,6 +49,8 @@ struct Physics {
   double thickness = 1e-3;               ///< m: surfaces never come as near as this
   double reach = 2e-3;                   ///< m: surfaces repel each other nearer than thickness + reach
   double repulsion = 1000;               ///< m/s^2: scales the barrier, with the mean mass of a vertex
+  double friction = 0.3;                 ///< coefficient; 0: none
+  double slip_speed = 0.01;              ///< m/s: slower than that, friction is less than its limit
   double tolerance = 2e-5;               ///< m: a step ends when no coordinate changes by more
   std::uint32_t most_iterations = 60;    ///< of Newton's method in a step
 

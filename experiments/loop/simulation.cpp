@@ -54,6 +54,8 @@ json header_record(const SimulationOptions& options, const Simulated& scene) {
             {"thickness_m", physics.thickness},
             {"reach_m", physics.reach},
             {"repulsion_m_s2", physics.repulsion},
+            {"friction", physics.friction},
+            {"slip_speed_m_s", physics.slip_speed},
             {"tolerance_m", physics.tolerance},
             {"most_iterates", physics.most_iterations}}},
           {"commit", commit()},

@@ -10,6 +10,7 @@
 #include "core/broad_phase/element_distance.hpp"
 #include "experiments/loop/barrier.hpp"
 #include "experiments/loop/elasticity.hpp"
+#include "experiments/loop/friction.hpp"
 #include "tests/support/random.hpp"
 
 namespace kbvh::experiments::loop {
@@ -200,6 +201,49 @@ TEST(Barrier, ProjectionLeavesNoNegativeEigenvalue) {
     }
   });
   EXPECT_GT(changed, 50);
+}
+
+TEST(Friction, ForceIsThatOfDifferencesAndAtMostItsLimit) {
+  Random random(6);
+  int sticking = 0, sliding = 0;
+  for_samples(30, [&](const Sample& sample) {
+    const PairFriction friction =
+        pair_friction(tested_barrier, sample.kind, sample.points, sample.fading, 0.4, 0.3);
+    PairForce normal;
+    pair_force(tested_barrier, sample.kind, sample.points, sample.fading, Curvature::exact, normal);
+    // The limit is the coefficient times the force along the normal, which faded edges exert in part.
+    if (sample.fading.below == 0) {
+      const ClosestPoints closest = closest_points(sample.kind, sample.points);
+      EXPECT_NEAR(friction.limit, 0.4 * normal.gradient.norm() / closest.weights.norm(),
+                  1e-10 * friction.limit);
+    }
+    EXPECT_GT(friction.limit, 0);
+    const FourPoints moved = 0.5 * some_points(random);
+    PairForce force, less, more;
+    friction_force(friction, moved, force);
+    const Eigen::Vector3d relative = moved * friction.weights;
+    const double length = (friction.tangents.transpose() * relative).norm();
+    ++(length < friction.slip ? sticking : sliding);
+    EXPECT_LE(force.gradient.norm(), friction.limit * friction.weights.norm() * (1 + 1e-12));
+    EXPECT_GE(force.gradient.dot(Eigen::Map<const Vector12>(moved.data())), 0);  // takes energy away
+    EXPECT_EQ(force.energy, friction_energy(friction, moved));
+    constexpr double step = 1e-6;
+    if (std::fabs(length - friction.slip) < 1e-4) return;
+    for (int k = 0; k < 12; ++k) {
+      FourPoints points = moved;
+      points.data()[k] += step;
+      friction_force(friction, points, more);
+      points.data()[k] -= 2 * step;
+      friction_force(friction, points, less);
+      EXPECT_NEAR(force.gradient[k], (more.energy - less.energy) / (2 * step), 1e-6 * friction.limit);
+      const Vector12 difference = (more.gradient - less.gradient) / (2 * step);
+      EXPECT_LE((force.hessian.col(k) - difference).norm(), 1e-5 * friction.limit / friction.slip);
+    }
+    const Eigen::SelfAdjointEigenSolver<Matrix12> solver(force.hessian);
+    EXPECT_GE(solver.eigenvalues()[0], -1e-12 * force.hessian.norm());
+  });
+  EXPECT_GT(sticking, 30);
+  EXPECT_GT(sliding, 30);
 }
 
 TEST(Elasticity, ForcesAreThoseOfDifferences) {

@@ -214,6 +214,37 @@ TEST(ImplicitStep, ConservesMomentumInAnImpact) {
   EXPECT_GT(most_contacts, 20u);
 }
 
+/// A soft box slides on a floor: friction takes coefficient * gravity of its speed, then it stands still.
+TEST(ImplicitStep, FrictionStopsWhatSlides) {
+  for (const double friction : {0.0, 0.3}) {
+    MeshBuilder builder;
+    const std::vector<Eigen::Vector3d> floor{{-9, -9, 0}, {9, -9, 0}, {9, 9, 0}, {-9, 9, 0}};
+    const std::vector<Eigen::Vector3<std::uint32_t>> floor_faces{{0, 1, 2}, {0, 2, 3}};
+    builder.add_obstacle(floor, floor_faces);
+    const std::uint32_t first = builder.add_soft_box({-0.1, -0.13, 0.002}, 0.2, 2, 100, 2000);
+    Simulated scene{builder.finish(), {}};
+    scene.physics.friction = friction;
+    constexpr double speed = 1.2;
+    for (Eigen::Index v = first; v < scene.mesh.velocities.rows(); ++v) scene.mesh.velocities(v, 0) = speed;
+    ContactFinder finder{ContactMesh(scene.mesh), {Detection::refit, 0, scene.physics.radius(), 0}};
+    ImplicitStep step(scene, finder);
+    State state = first_state(scene.mesh);
+    double at_20 = 0, at_35 = 0, last = 0;
+    for (int i = 1; i <= 80; ++i) {
+      last = step.advance(state).momentum[0] / 0.8;
+      if (i == 20) at_20 = last;
+      if (i == 35) at_35 = last;
+    }
+    if (friction == 0) {
+      EXPECT_NEAR(last, speed, 1e-3);
+    } else {
+      EXPECT_NEAR(at_20 - at_35, 0.3 * 9.81 * 0.15, 0.1 * 0.3 * 9.81 * 0.15);
+      EXPECT_NEAR(last, 0, 0.02);
+    }
+    EXPECT_EQ(PenetrationCheck(scene.mesh).intersecting_pairs(state.positions), 0u);
+  }
+}
+
 TEST(PenetrationCheck, CountsWhatAllPairsCount) {
   Simulated scene = make_scene("cloths", 200, 1);
   Random random(5);
