@@ -78,6 +78,8 @@ int run_simulation(LoopArguments arguments) {
   options.folder = arguments.out;
   if (options.record && options.folder.empty())
     throw io::InputError("--record: needs --out, the folder of the recording");
+  if (options.frames_every > 0 && options.folder.empty())
+    throw io::InputError("--frames: needs --out, the folder of the frames");
   Progress progress;
   StepSums sums;
   std::uint64_t penetrations = 0;
@@ -173,6 +175,8 @@ void add_loop(CLI::App& program, Action& action) {
       add_whole(*command, "--save-every", options.save_every, {1, 1000000},
                 "steps between two saved states (10)"),
       add_text(*command, "--out", a->out, "folder for results and for continuing (none: the table only)"),
+      add_whole(*command, "--frames", options.frames_every, {1, 1000000},
+                "steps between two frames in DIR/frames, as OBJ files (none)"),
       command->add_flag("--record", options.record, "also write DIR/loop.recording")};
   CLI::Option* play = add_text(*command, "--play", a->recording, "replay this recording");
   for (CLI::Option* option : of_simulations) play->excludes(option);

@@ -14,6 +14,7 @@
 #include "experiments/common/stopwatch.hpp"
 #include "experiments/common/text.hpp"
 #include "experiments/io/bytes.hpp"
+#include "experiments/loop/frames.hpp"
 #include "experiments/loop/penetration.hpp"
 #include "experiments/loop/recording.hpp"
 #include "experiments/loop/saved_state.hpp"
@@ -26,10 +27,10 @@ namespace {
 
 /// What distinguishes a simulation from others; the number of steps does not.
 json identity_of(const SimulationOptions& options) {
-  return {{"scene", options.scene},  {"triangles", options.triangles},
-          {"seed", options.seed},    {"detection", name(options.detection)},
-          {"keep", options.keep},    {"lose_every", options.lose_every},
-          {"record", options.record}};
+  return {{"scene", options.scene},   {"triangles", options.triangles},
+          {"seed", options.seed},     {"detection", name(options.detection)},
+          {"keep", options.keep},     {"lose_every", options.lose_every},
+          {"record", options.record}, {"frames_every", options.frames_every}};
 }
 
 json header_record(const SimulationOptions& options, const Simulated& scene) {
@@ -104,7 +105,7 @@ class StepLines {
 class SimulationFiles {
  public:
   SimulationFiles(const SimulationOptions& options, const Simulated& scene, SavedState& saved)
-      : options_(options), header_(header_record(options, scene)) {
+      : options_(options), mesh_(scene.mesh), header_(header_record(options, scene)) {
     Hasher hasher;
     const std::string text = identity_of(options).dump() + commit();
     hasher.bytes(text.data(), text.size());
@@ -138,6 +139,10 @@ class SimulationFiles {
   void write(const json& record) {
     if (lines_) lines_->write(record);
   }
+  void save_frame_of(const State& state) {
+    if (lines_ && options_.frames_every > 0 && state.step % options_.frames_every == 0)
+      save_frame(options_.folder / "frames", mesh_, state.positions, state.step);
+  }
   void save(SavedState& saved) {
     if (!lines_) return;
     saved.lines_bytes = lines_->bytes();
@@ -149,6 +154,7 @@ class SimulationFiles {
   std::filesystem::path state_file() const { return options_.folder / "loop.state"; }
 
   const SimulationOptions& options_;
+  const SimulatedMesh& mesh_;
   json header_;
   std::unique_ptr<RecordingWriter> recording_;
   std::unique_ptr<StepLines> lines_;
@@ -195,6 +201,7 @@ SimulationResult simulate(const SimulationOptions& options, const std::function<
                        files.sink());
   ImplicitStep step(scene, finder);
   PenetrationCheck check(scene.mesh);
+  files.save_frame_of(saved.state);
   while (saved.state.step < options.steps) {
     files.begin_step(saved.state.step);
     const DetectionWork before = finder.work();
@@ -223,6 +230,7 @@ SimulationResult simulate(const SimulationOptions& options, const std::function<
     record["memory_bytes"] = finder.bytes() + step.bytes();
     record["peak_resident_bytes"] = peak_memory();
     files.write(record);
+    files.save_frame_of(saved.state);
     if (saved.state.step % options.save_every == 0 || saved.state.step == options.steps) files.save(saved);
     if (done) done(record);
   }

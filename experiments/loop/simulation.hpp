@@ -18,6 +18,7 @@ struct SimulationOptions {
   std::uint64_t save_every = 10;   ///< steps
   std::uint32_t lose_every = 0;    ///< IterateDetector::Settings
   bool record = false;             ///< writes loop.recording
+  std::uint64_t frames_every = 0;  ///< steps between two frames as OBJ files; 0: none
   std::filesystem::path folder{};  ///< empty: nothing is written, and nothing is continued
 };
 
@@ -39,6 +40,7 @@ std::uint64_t hash_of_state(const State& state);
 ///   loop.jsonl      a line of JSON for the simulation, then one for each step (experiments/RESULTS.md)
 ///   loop.state      the state after the last saved step, replaced in one move
 ///   loop.recording  with `record`: see recording.hpp
+///   frames/         with `frames_every`: see frames.hpp
 /// Lines and iterates after the last saved step are cut off before the run continues, so the files of a run
 /// that was killed and continued hold each step once, with the bits of a run that was not; times differ.
 /// Calls done(record) after each step with its line. Throws io::InputError if a file cannot be read or

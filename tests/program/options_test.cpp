@@ -104,6 +104,7 @@ const std::map<std::string, std::vector<Option>> all_options{
       {"--keep", Kind::number, "1"},
       {"--save-every", Kind::number, "1"},
       {"--lose", Kind::number, "1"},
+      {"--frames", Kind::number, "1"},
       {"--play", Kind::names, "loop.recording"},
       {"--truth-every", Kind::number, "1"},
       {"--iterates", Kind::number, "1"},

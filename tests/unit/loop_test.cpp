@@ -12,6 +12,7 @@
 #include "experiments/common/text.hpp"
 #include "experiments/io/animated_mesh.hpp"
 #include "experiments/io/bytes.hpp"
+#include "experiments/io/frames.hpp"
 #include "experiments/loop/penetration.hpp"
 #include "experiments/loop/player.hpp"
 #include "experiments/loop/simulation.hpp"
@@ -282,6 +283,24 @@ TEST(PenetrationCheck, CountsWhatAllPairsCount) {
     sum += expected;
   }
   EXPECT_GT(sum, 100u);
+}
+
+TEST(Simulation, FramesAreTheStatesAsObjFiles) {
+  TemporaryFolder folder;
+  SimulationOptions options = small("stack", 4);
+  options.folder = folder / "out";
+  options.frames_every = 2;
+  const State last = simulate(options).state;
+  EXPECT_EQ(io::numbered_frames(folder / "out" / "frames").size(), 3u);
+  const io::AnimatedMesh mesh = io::read_frames(folder / "out" / "frames", 50);
+  ASSERT_EQ(mesh.vertex_count, std::uint32_t(last.positions.rows()));
+  ASSERT_EQ(mesh.keyframe_times.size(), 3u);
+  const Positions first = make_scene("stack", options.triangles, 1).mesh.positions;
+  const std::size_t size = std::size_t(first.size());
+  for (std::size_t i = 0; i < size; ++i) {
+    EXPECT_EQ(mesh.positions[i], first.data()[i]);
+    EXPECT_EQ(mesh.positions[2 * size + i], last.positions.data()[i]);
+  }
 }
 
 /// A recording of a few steps.
