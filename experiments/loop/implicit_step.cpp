@@ -4,6 +4,7 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <stdexcept>
 #include <tuple>
 
 #include "experiments/loop/elasticity.hpp"
@@ -171,6 +172,7 @@ StepReport ImplicitStep::advance(State& state) {
   collect(x_, active_);
   find_friction();
   double present = energy(x_, active_);
+  if (!std::isfinite(present)) throw std::runtime_error("two surfaces are nearer than their thickness");
   StepReport result;
   std::uint32_t evaluations = 0;
   while (result.iterates < physics.most_iterations) {
@@ -193,7 +195,8 @@ StepReport ImplicitStep::advance(State& state) {
         part /= 2;
     }
     if (!accepted) {
-      result.ending = Ending::stalled;
+      // Without a sensible direction left, rounding decides whether the energy decreases.
+      result.ending = size <= physics.tolerance ? Ending::converged : Ending::stalled;
       break;
     }
     x_.swap(trial_);

@@ -53,8 +53,8 @@ class ImplicitStep {
   /// Keeps references to the scene and the finder, whose radius must be that of the scene's physics.
   ImplicitStep(const Simulated& scene, ContactFinder& finder);
 
-  /// Replaces the state by that one time step later. Throws std::runtime_error if a direction cannot be
-  /// computed.
+  /// Replaces the state by that one time step later. Throws std::runtime_error if a pair of the state is
+  /// nearer than the thickness, or a direction cannot be computed.
   StepReport advance(State& state);
 
   const Barrier& barrier() const { return barrier_; }
