@@ -132,11 +132,8 @@ double ContactFinder::look_along(std::uint32_t iterate, const Positions& x, cons
     impact = broad().earliest_impact(separation);
   }
   work_.impact_seconds += seconds_since(searched);
-  if (part < 1) {
-    // The caller moves within the shorter part, whose candidates are current.
-    if (part <= 1e-12) return 0;
-  }
   work_.searches = broad().detections();
+  if (part <= 1e-12) return 0;
   return impact.touches ? 0.9 * impact.begin * part : part;
 }
 

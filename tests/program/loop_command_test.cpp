@@ -1,4 +1,5 @@
 // `kbvh loop` as a shell sees it: exit codes, files, a run that is killed, and a replay.
+#include <algorithm>
 #include <map>
 
 #include "binary.hpp"
