@@ -128,7 +128,7 @@ TEST_P(EveryScene, StartsApart) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, EveryScene, testing::ValuesIn(scene_names()),
-                         [](const auto& info) { return info.param; });
+                         [](const auto& scene) { return scene.param; });
 
 struct Killed {};
 
@@ -205,7 +205,9 @@ TEST(ImplicitStep, ConservesMomentumInFlight) {
       EXPECT_LE((report.momentum - expected).norm(), 1e-11) << i;
       // Implicit Euler takes energy away and never adds any.
       const double now = report.kinetic + report.elastic + report.barrier;
-      if (gravity.isZero()) EXPECT_LE(now, energy * (1 + 1e-9));
+      if (gravity.isZero()) {
+        EXPECT_LE(now, energy * (1 + 1e-9));
+      }
       energy = now;
     }
   }
@@ -359,7 +361,9 @@ TEST_F(Recorded, AllWaysAgreeOnIt) {
     EXPECT_EQ(way.lacking, 0u) << name(way.question) << name(way.detection) << way.keep;
     EXPECT_GT(way.over_refit, 0);
     EXPECT_GT(way.listed, 0u);
-    if (way.detection == Detection::kept && way.keep == 2) EXPECT_LT(way.searches, 2 * result.iterates);
+    if (way.detection == Detection::kept && way.keep == 2) {
+      EXPECT_LT(way.searches, 2 * result.iterates);
+    }
   }
   EXPECT_TRUE(result.agree());
 }
