@@ -241,7 +241,7 @@ TEST(ImplicitStep, FrictionStopsWhatSlides) {
     const std::vector<Eigen::Vector3d> floor{{-9, -9, 0}, {9, -9, 0}, {9, 9, 0}, {-9, 9, 0}};
     const std::vector<Eigen::Vector3<std::uint32_t>> floor_faces{{0, 1, 2}, {0, 2, 3}};
     builder.add_obstacle(floor, floor_faces);
-    const std::uint32_t first = builder.add_soft_box({-0.1, -0.13, 0.002}, 0.2, 2, 100, 2000);
+    const std::uint32_t first = builder.add_soft_box({-0.1, -0.13, 0.0031}, 0.2, 2, 100, 2000);
     Simulated scene{builder.finish(), {}};
     scene.physics.friction = friction;
     constexpr double speed = 1.2;
