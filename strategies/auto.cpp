@@ -194,7 +194,7 @@ class Auto final : public OneOfMany<S>,
   }
   /// Returns the work of this frame without the query.
   double update_work() const {
-    return price().body * seen_.bodies + (searches_ ? price().read * seen_.reads : 0);
+    return price().frame + price().body * seen_.bodies + (searches_ ? price().read * seen_.reads : 0);
   }
   /// Counts the work of the frame that ends.
   void end_frame() {
@@ -246,7 +246,8 @@ class Auto final : public OneOfMany<S>,
     seen_.refit = never;
     for (std::size_t i = 0; i < runners_.size(); ++i)
       if (refits(runners_[i])) seen_.refit = std::min(seen_.refit, policy_->estimate(i));
-    seen_.search = std::max(0.0, seen_.refit - refit.read * seen_.reads - refit.body * seen_.bodies);
+    seen_.search =
+        std::max(0.0, seen_.refit - refit.frame - refit.body * seen_.bodies - refit.read * seen_.reads);
     seen_.ageing = seen_.search * (1 - 1 / seen_.growth) / (this->frame() + 1);
     for (std::size_t i = 0; i < runners_.size(); ++i) {
       const ChoiceCandidate& candidate = *runners_[i].candidate;
@@ -254,9 +255,10 @@ class Auto final : public OneOfMany<S>,
       Offer& offer = offers_[i];
       offer.frames = frames_of(i, t);
       offer.whole = joins ? int(std::min(seen_.frames, double(longest_unit))) : offer.frames;
-      offer.fixed = candidate.costs.body * seen_.bodies +
+      offer.fixed = candidate.costs.frame + candidate.costs.body * seen_.bodies +
                     candidate.costs.read * seen_.reads / (joins ? seen_.frames : 1);
-      offer.start = this->goes_on(i) ? 0 : candidate.costs.start * seen_.primitives;
+      offer.start = this->goes_on(i) ? 0 : candidate.costs.build * seen_.primitives;
+      offer.cold = this->instances_[i].started ? 0 : candidate.costs.cold * seen_.primitives;
       if (candidate.predict == nullptr || std::isfinite(policy_->estimate(i))) continue;
       const ChoiceCandidate::Prediction predicted = candidate.predict(seen_, candidate.costs);
       offer.expected = predicted.expected;

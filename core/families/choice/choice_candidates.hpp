@@ -28,11 +28,12 @@ enum class ChoiceUnit : std::uint8_t {
 /// its first unit. All work is in nanoseconds; only ratios matter.
 struct ChoiceCandidate {
   struct Costs {
-    double read = 0, body = 0;  ///< in each unit or frame: a vertex that a refit reads, a moving body
+    double frame = 0, body = 0;  ///< of a frame, and of each moving body in it
+    double read = 0;             ///< of each vertex that a refit reads: in a frame, or once for a segment
     double box_test = 0, candidate = 0;
     double span_test = 0, triangle_test = 0, fetch = 0;  ///< of a join
-    double build = 0;  ///< of a primitive, when a tree has aged; 0: no trees are built
-    double start = 0;  ///< of a primitive, in the first frame
+    double build = 0;  ///< of a primitive, at the start and when a tree has aged; 0: no trees are built
+    double cold = 0;   ///< of a primitive, in the first frame since `reset`: memory that is not warm
   };
   struct Prediction {
     double expected, hoped;  ///< work of a frame: usual, and at best

@@ -175,7 +175,8 @@ std::size_t ChoicePolicy::challenger() {
     const double hoped = one.known ? expected / (1 + age(one)) : offer.hoped;
     if (!(hoped < stay / settings_.gain)) continue;
     one.regret += (stay - hoped) * answered_;
-    const double cost = offer.start + offers_[incumbent_].start + (expected - stay) * offer.frames;
+    const double cost =
+        offer.cold + offer.start + offers_[incumbent_].start + (expected - stay) * offer.frames;
     if (one.regret + (stay - hoped) * std::max(offer.frames, horizon) < cost) continue;
     if (hoped < least && offer.start + hoped * offer.frames <= trial_limit(i)) {
       least = hoped;

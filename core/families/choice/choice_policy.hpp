@@ -13,6 +13,7 @@ struct Offer {
   double hoped = 0;     ///< the same at best; at most `expected`
   double fixed = 0;     ///< part of the work per frame that contacts do not change
   double start = 0;     ///< work of a start, in addition to that of its frames; 0 while active
+  double cold = 0;      ///< disadvantage of a first start that is no counted work: memory that is not warm
   int frames = 1;       ///< frames that a unit would answer from this frame on; 0: it cannot begin now
   int whole = 1;        ///< frames of a whole unit
 };
