@@ -166,6 +166,37 @@ class BroadPhase:
         """Excludes pairs (n, 2) of one kind, in place of those excluded before."""
         self._core.exclude(kind, np.asarray(pairs).reshape(-1, 2) if np.size(pairs) == 0 else pairs)
 
+    def use_threads(self, threads: int) -> None:
+        """Sets the number of threads that share searches, 1 at first. Answers and their order do not depend on it. Raises
+        ValueError for more threads than this machine has."""
+        self._core.use_threads(threads)
+
+    def exclude_rings(self, rings: int) -> None:
+        """Excludes pairs of elements, of all kinds, that at most `rings` edges connect: edges of E and sides of faces, as far as
+        they are not removed. 0 ends this.
+
+        >>> v = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0], [4, 0, 0], [5, 0, 0]]) * 0.1
+        >>> broad = kbvh.BroadPhase()
+        >>> broad.build(v, edges=[[0, 1], [1, 2], [2, 3], [3, 4], [4, 5]], faces=[], radius=1)
+        >>> broad.exclude_rings(1)
+        >>> sorted(broad.candidates("edge_edge").tolist())
+        [[0, 3], [0, 4], [1, 4]]
+        """
+        self._core.exclude_rings(rings)
+
+    def self_intersections(self) -> npt.NDArray[np.uint32]:
+        """Finds the pairs (n, 2) of faces, without a common vertex, that have a common point: exactly, as within("face_face", 0)
+        does. Patches of the mesh that are proved not to touch themselves, by cones of their normals and projected contours, are
+        left out: a smooth mesh has few others.
+
+        >>> v = np.array([[0, 0, 0], [2, 0, 0], [0, 2, 0], [0.5, 0.5, -1], [0.5, 0.5, 1], [3, 3, 1]])
+        >>> broad = kbvh.BroadPhase()
+        >>> broad.build(v, edges=[], faces=[[0, 1, 2], [3, 4, 5]], radius=0)
+        >>> broad.self_intersections().tolist()
+        [[0, 1]]
+        """
+        return self._core.self_intersections()
+
     def keep_only(self, choose: Optional[Callable[[str, npt.NDArray[np.uint32]], Any]]) -> None:
         """Lets a function choose among the pairs that no other filter excludes: choose(kind, pairs) gets many pairs (n, 2) at a
         time and returns an array of n truth values. It has to give the same answer whenever it is asked about a pair. None

@@ -7,7 +7,6 @@
 
 #include "core/broad_phase/checked_input.hpp"
 #include "core/broad_phase/element_distance.hpp"
-#include "core/families/wide/leaf_slots.hpp"
 #include "core/geometry/box.hpp"
 
 namespace kbvh {
@@ -22,7 +21,10 @@ StridedPoints<S> strided(const MatrixView<S>& v) {
 
 template <class S>
 BroadPhase<S>::BroadPhase(const BroadPhaseSettings& settings)
-    : settings_(settings), kernels_(settings.kernels.value_or(active_kernel_set())) {
+    : settings_(settings),
+      kernels_(settings.kernels.value_or(active_kernel_set())),
+      workers_(settings.threads),
+      face_tests_(settings.threads) {
   if (settings.leaf_size < 5 || settings.leaf_size > 16)
     throw std::invalid_argument("leaf size must be 5 to 16, got " + std::to_string(settings.leaf_size));
   if (!(settings.most_growth >= 1))
@@ -58,6 +60,7 @@ void BroadPhase<S>::start(const MatrixView<S>& v0, const MatrixView<S>& v1, Elem
     trees_[kind].start(elements_->lists[kind], settings_.leaf_size, kernels_);
   detections_ = references_ = 0;
   filter_.clear();
+  patch_members_.forget_sides();
   for (std::size_t kind = 0; kind < candidate_kinds.size(); ++kind) {
     candidate_changes_[kind].clear();
     near_changes_[kind].clear();
@@ -228,6 +231,7 @@ InsertedElements BroadPhase<S>::add(const MatrixView<S>& v, const Primitives& ed
   if (v.rows != 0) add_vertices(v);
   filter_.elements_inserted(*elements_);
   groups_changed();
+  connections_changed();
   return first;
 }
 
@@ -269,7 +273,7 @@ void BroadPhase<S>::remove(Element element, std::span<const std::uint32_t> ids) 
   const char* const word = element == Element::vertex ? "vertex "
                            : element == Element::edge ? "edge "
                                                       : "face ";
-  std::vector<std::uint32_t> sorted(ids.begin(), ids.end());
+  UnfilledArray<std::uint32_t> sorted(ids.begin(), ids.end());  // GCC 12 warns wrongly about std::allocator's
   std::sort(sorted.begin(), sorted.end());
   for (std::size_t i = 0; i < sorted.size(); ++i) {
     const std::uint32_t id = sorted[i];
@@ -281,7 +285,8 @@ void BroadPhase<S>::remove(Element element, std::span<const std::uint32_t> ids) 
   }
   if (sorted.empty()) return;
   for (const std::uint32_t id : sorted) list.remove(id);
-  trees_[std::size_t(element)].elements_removed(boxes_.data(), sorted);
+  if (element != Element::vertex) connections_changed();
+  trees_[std::size_t(element)].elements_removed(boxes_.data(), {sorted.data(), sorted.size()});
   for (const CandidateKind kind : candidate_kinds) {
     CandidateBuffer& found = found_[std::size_t(kind)];
     if (!found_valid_[std::size_t(kind)]) continue;
@@ -291,6 +296,14 @@ void BroadPhase<S>::remove(Element element, std::span<const std::uint32_t> ids) 
         return (first && !list.alive(pair.first)) || (second && !list.alive(pair.second));
       });
   }
+}
+
+template <class S>
+void BroadPhase<S>::connections_changed() {
+  patch_members_.forget_sides();
+  if (filter_.rings() == 0) return;
+  filter_.connections_changed();
+  forget_found();
 }
 
 template <class S>
@@ -316,6 +329,13 @@ template <class S>
 void BroadPhase<S>::exclude(CandidateKind kind, std::span<const Candidate> pairs) {
   filter_.exclude(elements(), kind, pairs);
   found_valid_[std::size_t(kind)] = false;
+}
+
+template <class S>
+void BroadPhase<S>::exclude_rings(std::uint32_t rings) {
+  elements();
+  filter_.exclude_rings(rings);
+  forget_found();
 }
 
 template <class S>
@@ -347,67 +367,40 @@ ElementTree<S>& BroadPhase<S>::current_tree(Element element) {
 }
 
 template <class S>
-void BroadPhase<S>::search(CandidateKind kind, CandidateBuffer& out) {
-  ++detections_;
-  last_box_tests_ = 0;
-  out.clear();
+ElementSearchJob<S> BroadPhase<S>::search_job(CandidateKind kind) {
   const Element first = first_element(kind), second = second_element(kind);
+  filter_.prepare(*elements_);
   ElementTree<S>& a = current_tree(first);
   ElementTree<S>& b = current_tree(second);
-  if (a.empty() || b.empty() || !overlap(a.root_box(), b.root_box())) return;
-  const ElementLeaves<S> leaves_a = a.leaves(), leaves_b = b.leaves();
-  const bool one = first == second, grouped = filter_.has_groups(kind);
-  const auto& kernels = wide_overlap_kernels<S>(kernels_);
-  const auto traverse = one ? kernels.self(8) : kernels.traverse(8);
-  const auto& by_groups = group_traversal_kernels<S>(kernels_);
-  const auto traverse_groups = one ? by_groups.self : by_groups.two;
-  const GroupArrays groups_a = grouped ? a.groups(filter_.groups(first)) : GroupArrays{};
-  const GroupArrays groups_b = grouped ? b.groups(filter_.groups(second)) : GroupArrays{};
-  stack_.resize(std::max<std::size_t>(stack_.size(), 1024));
-  leaf_pairs_.resize(2 * leaf_pair_room);
-  WideTraversal state{stack_.data(),  0, stack_.size(),    leaf_pairs_.data(), 0,
-                      leaf_pair_room, 1, ~std::uint64_t(0)};
-  state.stack[state.depth++] = {0, 0};
-  while (state.depth > 0) {
-    if (grouped)
-      traverse_groups(leaves_a.tree, leaves_b.tree, groups_a, groups_b, state);
-    else
-      traverse(leaves_a.tree, leaves_b.tree, state);
-    take_leaf_pairs(kind, leaves_a, leaves_b, state.found, out);
-    state.found = 0;
-    if (state.depth + max_pairs_per_step < state.stack_room) continue;
-    stack_.resize(2 * stack_.size());
-    state.stack = stack_.data();
-    state.stack_room = stack_.size();
+  ElementSearchJob<S> job{};
+  job.kind = kind;
+  if (a.empty() || b.empty() || !overlap(a.root_box(), b.root_box())) return job;
+  job.a = a.leaves();
+  job.b = b.leaves();
+  job.padded = settings_.leaf_size <= 8 ? 8 : 16;
+  job.kernels = kernels_;
+  job.grouped = filter_.has_groups(kind);
+  if (job.grouped) {
+    job.groups_a = a.groups(filter_.groups(first));
+    job.groups_b = b.groups(filter_.groups(second));
   }
-  last_box_tests_ += state.tests;
+  job.usual = std::size_t(4) * (elements_->count(first) + elements_->count(second));
+  static constexpr WidePair roots{0, 0};
+  job.starts = {&roots, 1};
+  return job;
 }
 
 template <class S>
-void BroadPhase<S>::take_leaf_pairs(CandidateKind kind, const ElementLeaves<S>& a, const ElementLeaves<S>& b,
-                                    std::size_t count, CandidateBuffer& out) {
-  const auto pairs =
-      element_pair_kernels<S>(kernels_).of[settings_.leaf_size <= 8 ? 0 : 1][std::size_t(kind)];
-  // Memory that is reserved and not written costs next to nothing; copies of long lists are expensive.
-  const std::size_t room_at_first =
-      element_pairs_step +
-      std::size_t(4) * (elements_->count(first_element(kind)) + elements_->count(second_element(kind)));
-  ElementPairsJob<S> job{a, b, leaf_pairs_.data(), 0, count, nullptr, 0, 0, 0};
+void BroadPhase<S>::search(CandidateKind kind, CandidateBuffer& out) {
+  ++detections_;
+  out.clear();
+  last_box_tests_ = 0;
+  const ElementSearchJob<S> job = search_job(kind);
+  if (job.starts.empty()) return;
   const bool filtered = filter_.looks_at(kind);
-  while (job.next < job.count) {
-    // The kernel writes into the list itself, as far as its memory reaches.
-    const std::size_t before = out.size();
-    if (out.capacity() - before < element_pairs_step)
-      out.reserve(std::max<std::size_t>(4 * out.capacity(), before + room_at_first));
-    out.resize(out.capacity());
-    job.out = &out[before].first;
-    job.found = 0;
-    job.out_room = out.size() - before;
-    pairs(job);
-    out.resize(before + job.found);
-    if (filtered) out.resize(before + filter_.keep(kind, {out.data() + before, job.found}));
-  }
-  last_box_tests_ += job.tests;
+  last_box_tests_ = 1 + run_search(job, out, [&](Candidate* pairs, std::size_t count, std::uint32_t) {
+                      return filtered ? filter_.keep(*elements_, kind, {pairs, count}) : count;
+                    });
 }
 
 template <class S>
@@ -443,9 +436,8 @@ void BroadPhase<S>::within(CandidateKind kind, double distance, CandidateBuffer&
     throw std::invalid_argument("within() takes a distance from 0 to the radius " +
                                 number_text(double(radius_)) + ", not " + number_text(distance));
   const CandidateBuffer& found = kept(kind);
-  const S* const points = motion_ == Motion::straight ? end_points_.data() : points_.data();
   out.resize(found.size());
-  out.resize(keep_within<S>(kind, *elements_, points, distance, span_of(found), out.data()));
+  out.resize(keep_within<S>(kind, *elements_, present_points(), distance, span_of(found), out.data()));
 }
 
 template <class S>
@@ -460,26 +452,12 @@ CandidateChanges BroadPhase<S>::changes_within(CandidateKind kind, double distan
 }
 
 template <class S>
-EarliestImpact BroadPhase<S>::earliest_impact(double separation, EarliestImpactStats* stats) {
-  elements();
-  if (motion_ != Motion::straight)
-    throw std::logic_error("an impact is asked for without a motion from V0 to V1");
-  if (!(separation >= 0 && separation <= double(radius_)))
-    throw std::invalid_argument("earliest_impact() takes a separation from 0 to the radius " +
-                                number_text(double(radius_)) + ", not " + number_text(separation));
-  EarliestImpact earliest;
-  for (const CandidateKind kind : {CandidateKind::face_vertex, CandidateKind::edge_edge})
-    take_earlier_impacts<S>(kind, *elements_, points_.data(), end_points_.data(), span_of(kept(kind)),
-                            separation, earliest, stats);
-  return earliest;
-}
-
-template <class S>
 std::size_t BroadPhase<S>::bytes() const {
   std::size_t total = (points_.capacity() + end_points_.capacity() + boxes_.capacity() +
                        displacements_.capacity() + grown_each_.capacity()) *
                           sizeof(S) +
-                      stack_.capacity() * sizeof(WidePair) + leaf_pairs_.capacity() * sizeof(LeafSlot);
+                      search_.bytes() + patches_.bytes() + patch_members_.bytes();
+  for (const FaceTests<S>& tests : face_tests_) total += tests.bytes();
   for (const ElementTree<S>& tree : trees_) total += tree.bytes();
   for (const CandidateBuffer& found : found_) total += found.capacity() * sizeof(Candidate);
   for (const auto* const trackers : {&candidate_changes_, &near_changes_})

@@ -9,10 +9,11 @@
 
 #include "core/broad_phase/changes.hpp"
 #include "core/broad_phase/earliest_impact.hpp"
+#include "core/broad_phase/element_search.hpp"
 #include "core/broad_phase/element_tree.hpp"
 #include "core/broad_phase/elements.hpp"
 #include "core/broad_phase/pair_filter.hpp"
-#include "core/families/wide/kernels/wide_overlap.hpp"
+#include "core/broad_phase/self_intersections.hpp"
 #include "core/kernels/kernel_set.hpp"
 
 namespace kbvh {
@@ -22,6 +23,9 @@ struct BroadPhaseSettings {
   std::uint32_t leaf_size = 16;
   /// A tree is built again where its nodes' surface has grown beyond this factor since it was built.
   double most_growth = 2;
+  /// Threads that share searches and tests of self intersections. Answers and their order do not depend on
+  /// it. At most most_threads() (core/parallel/workers.hpp).
+  std::uint32_t threads = 1;
   /// The instruction set; nothing: the widest that this processor supports. All compute the same bits.
   std::optional<KernelSet> kernels{};
 };
@@ -44,11 +48,12 @@ struct InsertedElements {
 /// the caller's memory, any strides (matrices and maps of Eigen convert), and are read during the call only.
 /// Every call that takes positions throws std::invalid_argument, and changes nothing, for another number of
 /// rows or columns and for an inadmissible coordinate, which it names. Once warm, nothing allocates except
-/// lists that become longer than ever before. One thread at a time.
+/// lists that become longer than ever before. One caller's thread at a time; filters of a caller are called
+/// on it.
 template <class S>
 class BroadPhase {
  public:
-  /// Throws std::invalid_argument for a leaf size or a growth out of range.
+  /// Throws std::invalid_argument for a leaf size, a growth or a number of threads out of range.
   explicit BroadPhase(const BroadPhaseSettings& settings = {});
   ~BroadPhase();
   BroadPhase(const BroadPhase&) = delete;
@@ -108,6 +113,13 @@ class BroadPhase {
   /// Excludes pairs of one kind, in place of those excluded before. Throws std::invalid_argument for an id
   /// that does not exist.
   void exclude(CandidateKind kind, std::span<const Candidate> pairs);
+  /// Excludes pairs of elements, of all kinds, that at most `rings` edges connect: where a way of so many
+  /// edges leads from a vertex of one element to a vertex of the other. Edges are those of E and the sides of
+  /// faces; removed ones do not count. 0: incident elements only, which never are candidates. The next search
+  /// lists the vertices within so many edges of each vertex (about 1 + 3 k + 3 k^2 for k rings of a
+  /// triangulation), and does so again after elements were inserted or removed; it throws std::length_error
+  /// for 2^32 of them or more.
+  void exclude_rings(std::uint32_t rings);
   /// Lets a function choose among the pairs that no other filter excludes, many at a time: see PairFunction.
   /// It has to give the same answer whenever it is asked about a pair. Exceptions that it throws end the
   /// search and pass to the caller. An empty function ends this.
@@ -125,6 +137,14 @@ class BroadPhase {
   }
   /// Ends all filters.
   void clear_filters();
+
+  /// Sets the number of threads (BroadPhaseSettings::threads). Throws std::invalid_argument for 0, and for
+  /// more than there are.
+  void use_threads(std::uint32_t threads) {
+    Workers workers(threads);
+    face_tests_.resize(threads);
+    workers_ = std::move(workers);
+  }
 
   /// Makes the trees of earlier searches current now; otherwise the next search does this.
   void refresh();
@@ -154,13 +174,24 @@ class BroadPhase {
   /// and those of candidates do not affect each other. Throws as `within` does.
   CandidateChanges changes_within(CandidateKind kind, double distance);
 
+  /// Finds all self intersections of the faces: the pairs of faces, without a common vertex, that have a
+  /// common point, exactly as within(face_face, 0) finds them. Of a motion, at its end. Candidates are not
+  /// kept, and answers are in another order. With `cones`, the search leaves out patches that are proved not
+  /// to touch themselves (PatchCertificate): a smooth mesh has few others. After a build of the faces' tree,
+  /// the first call with cones lists contours, which takes about as long as the build.
+  void self_intersections(CandidateBuffer& out, SelfCulling culling = SelfCulling::cones,
+                          SelfIntersectionStats* stats = nullptr);
+
   /// Finds the first time during the motion from V0 to V1 at which the distance of a vertex and a face, or of
   /// two edges, is at most the separation; 0: the first contact. Verdicts are exact, in real arithmetic on
   /// the given numbers, no epsilon (core/continuous/impact.hpp; core/broad_phase/approach.hpp), and the time
   /// is enclosed. A distance that is reached at a single instant counts, and so does t = 0. Incident elements
   /// do not count, nor do pairs that a filter excludes. Throws std::logic_error unless the last positions
-  /// were a motion, and std::invalid_argument unless 0 <= separation <= radius.
-  EarliestImpact earliest_impact(double separation = 0, EarliestImpactStats* stats = nullptr);
+  /// were a motion, and std::invalid_argument unless 0 <= separation <= radius. With `cones`, contacts are
+  /// not looked for within patches that are proved not to touch themselves during the whole motion; with a
+  /// separation, cones change nothing.
+  EarliestImpact earliest_impact(double separation = 0, EarliestImpactStats* stats = nullptr,
+                                 SelfCulling culling = SelfCulling::cones);
 
   /// From now on candidates hold for all positions in which no coordinate of a vertex differs by more than
   /// `displacement` from its value at the last detection: updates within that bound cost a comparison and
@@ -209,11 +240,27 @@ class BroadPhase {
   InsertedElements add(const MatrixView<S>& v, const Primitives& edges, const Primitives& faces);
   void add_vertices(const MatrixView<S>& v);
   void groups_changed();
+  /// Takes other connections of vertices: with rings, pairs of all kinds may begin or end.
+  void connections_changed();
+  /// Returns the members of the patches that do not touch themselves during the motion.
+  const PatchMembers& certified_patches();
   ElementTree<S>& current_tree(Element element);
+  /// Returns a search of current trees from their roots; without starts if their boxes do not meet.
+  ElementSearchJob<S> search_job(CandidateKind kind);
   void search(CandidateKind kind, CandidateBuffer& out);
-  void take_leaf_pairs(CandidateKind kind, const ElementLeaves<S>& a, const ElementLeaves<S>& b,
-                       std::size_t count, CandidateBuffer& out);
+  /// Searches on all threads, or on the caller's alone if a function of the caller or the size of the mesh
+  /// asks for that. Returns the number of box tests.
+  template <class Sift>
+  std::uint64_t run_search(const ElementSearchJob<S>& job, CandidateBuffer& out, const Sift& sift) {
+    const bool alone = filter_.has_function() || job.usual < 4 * few_elements;
+    return alone ? search_.run_alone(job, out, sift) : search_.run(workers_, job, out, sift);
+  }
+  static constexpr std::size_t few_elements = 4096;
   const CandidateBuffer& kept(CandidateKind kind);
+  /// Returns the present positions, [vertex][4]: of a motion, its end.
+  const S* present_points() const {
+    return motion_ == Motion::straight ? end_points_.data() : points_.data();
+  }
 
   BroadPhaseSettings settings_;
   KernelSet kernels_;
@@ -232,9 +279,11 @@ class BroadPhase {
   PairFilter filter_;
   std::array<ChangeTracker, 6> candidate_changes_, near_changes_;
   CandidateBuffer near_;
-  // For temporary use by searches.
-  std::vector<WidePair> stack_;
-  std::vector<LeafSlot> leaf_pairs_;
+  Workers workers_;
+  ElementSearch<S> search_;
+  PatchCulling<S> patches_;
+  PatchMembers patch_members_;
+  std::vector<FaceTests<S>> face_tests_;  // [runner]
   std::uint64_t detections_ = 0, references_ = 0, last_box_tests_ = 0;
 };
 

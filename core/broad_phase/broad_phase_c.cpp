@@ -158,6 +158,15 @@ int kbvh_broad_phase_within(kbvh_broad_phase* handle, kbvh_candidate_kind kind, 
   });
 }
 
+int kbvh_broad_phase_self_intersections(kbvh_broad_phase* handle, const uint32_t** pairs, size_t* count) {
+  return guarded(handle, [&](auto& broad, auto) {
+    check_pointer(pairs, "pairs");
+    check_pointer(count, "count");
+    broad.self_intersections(handle->within);
+    hand_over(span_of(handle->within), pairs, count);
+  });
+}
+
 int kbvh_broad_phase_insert(kbvh_broad_phase* handle, const kbvh_positions* v, const int32_t* edges,
                             size_t edge_count, const int32_t* faces, size_t face_count, uint32_t first[3]) {
   return guarded(handle, [&]<class S>(BroadPhase<S>& broad, S) {
@@ -197,6 +206,14 @@ int kbvh_broad_phase_exclude(kbvh_broad_phase* handle, kbvh_candidate_kind kind,
     for (std::size_t i = 0; i < count; ++i) list.push_back({pairs[2 * i], pairs[2 * i + 1]});
     broad.exclude(checked(kind), list);
   });
+}
+
+int kbvh_broad_phase_use_threads(kbvh_broad_phase* handle, uint32_t threads) {
+  return guarded(handle, [&](auto& broad, auto) { broad.use_threads(threads); });
+}
+
+int kbvh_broad_phase_exclude_rings(kbvh_broad_phase* handle, uint32_t rings) {
+  return guarded(handle, [&](auto& broad, auto) { broad.exclude_rings(rings); });
 }
 
 int kbvh_broad_phase_keep_only(kbvh_broad_phase* handle, kbvh_pair_filter filter, void* context) {

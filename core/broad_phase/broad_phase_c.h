@@ -56,6 +56,8 @@ typedef struct {
 
 /* Returns a new handle; NULL if memory or the scalar does not allow it. */
 kbvh_broad_phase* kbvh_broad_phase_new(kbvh_scalar scalar);
+/* Sets the number of threads that share searches, 1 at first; answers and their order do not depend on it. */
+int kbvh_broad_phase_use_threads(kbvh_broad_phase* broad, uint32_t threads);
 void kbvh_broad_phase_free(kbvh_broad_phase* broad);
 /* Returns what the last failed call of this handle complained about; an empty text if none failed. */
 const char* kbvh_broad_phase_error(const kbvh_broad_phase* broad);
@@ -90,6 +92,8 @@ int kbvh_broad_phase_set_vertex_groups(kbvh_broad_phase* broad, const kbvh_group
 /* Excludes pairs [count][2] of one kind. */
 int kbvh_broad_phase_exclude(kbvh_broad_phase* broad, kbvh_candidate_kind kind, const uint32_t* pairs,
                              size_t count);
+/* Excludes pairs of elements that at most so many edges connect; 0 ends this. */
+int kbvh_broad_phase_exclude_rings(kbvh_broad_phase* broad, uint32_t rings);
 /* Lets a function choose among the pairs that no other filter excludes; NULL ends this. */
 int kbvh_broad_phase_keep_only(kbvh_broad_phase* broad, kbvh_pair_filter filter, void* context);
 int kbvh_broad_phase_clear_filters(kbvh_broad_phase* broad);
@@ -99,6 +103,10 @@ int kbvh_broad_phase_candidates(kbvh_broad_phase* broad, kbvh_candidate_kind kin
                                 size_t* count);
 int kbvh_broad_phase_within(kbvh_broad_phase* broad, kbvh_candidate_kind kind, double distance,
                             const uint32_t** pairs, size_t* count);
+
+/* Points *pairs to the pairs of faces [count][2], without a common vertex, that have a common point, exactly;
+   patches that cannot touch themselves are left out. In memory of the handle, valid until its next call. */
+int kbvh_broad_phase_self_intersections(kbvh_broad_phase* broad, const uint32_t** pairs, size_t* count);
 
 /* Point to the candidates that began and that ended since the last call for this kind, both ascending, in
    memory of the handle, valid until its next call; at the first call all begin. The second function compares

@@ -44,13 +44,19 @@ struct Motion {
 template <class S>
 void take_earlier_impacts(CandidateKind kind, const Elements& elements, const S* begin, const S* end,
                           std::span<const Candidate> candidates, double separation, EarliestImpact& earliest,
-                          EarliestImpactStats* stats) {
+                          EarliestImpactStats* stats, const PatchMembers* patches) {
   KBVH_ASSERT(kind == CandidateKind::face_vertex || kind == CandidateKind::edge_edge);
+  KBVH_ASSERT(patches == nullptr || separation == 0);
   const bool edges = kind == CandidateKind::edge_edge;
   const Contact::Kind contact = edges ? Contact::Kind::edge_edge : Contact::Kind::vertex_face;
   EarliestImpactStats counts;
   Motion motion;
   for (const Candidate& candidate : candidates) {
+    ++counts.candidates;
+    if (patches != nullptr && patches->together(kind, candidate)) {
+      ++counts.culled;
+      continue;
+    }
     std::uint32_t vertices[4];
     const auto first = elements.vertices(first_element(kind), candidate.first);
     const auto second = elements.vertices(second_element(kind), candidate.second);
@@ -62,7 +68,6 @@ void take_earlier_impacts(CandidateKind kind, const Elements& elements, const S*
         motion.begin[i][axis] = double(begin[std::size_t(4) * vertices[i] + std::size_t(axis)]);
         motion.end[i][axis] = double(end[std::size_t(4) * vertices[i] + std::size_t(axis)]);
       }
-    ++counts.candidates;
     if (motion.apart_until(earliest.end, edges ? 2 : 1, separation)) {
       ++counts.later;
       continue;
@@ -82,6 +87,7 @@ void take_earlier_impacts(CandidateKind kind, const Elements& elements, const S*
   }
   if (stats == nullptr) return;
   stats->candidates += counts.candidates;
+  stats->culled += counts.culled;
   stats->later += counts.later;
   stats->impacts.tests += counts.impacts.tests;
   stats->impacts.filtered += counts.impacts.filtered;
@@ -89,8 +95,10 @@ void take_earlier_impacts(CandidateKind kind, const Elements& elements, const S*
 }
 
 template void take_earlier_impacts(CandidateKind, const Elements&, const float*, const float*,
-                                   std::span<const Candidate>, double, EarliestImpact&, EarliestImpactStats*);
+                                   std::span<const Candidate>, double, EarliestImpact&, EarliestImpactStats*,
+                                   const PatchMembers*);
 template void take_earlier_impacts(CandidateKind, const Elements&, const double*, const double*,
-                                   std::span<const Candidate>, double, EarliestImpact&, EarliestImpactStats*);
+                                   std::span<const Candidate>, double, EarliestImpact&, EarliestImpactStats*,
+                                   const PatchMembers*);
 
 }  // namespace kbvh

@@ -3,6 +3,7 @@
 #include <span>
 
 #include "core/broad_phase/elements.hpp"
+#include "core/broad_phase/patch_members.hpp"
 #include "core/continuous/impact.hpp"
 
 namespace kbvh {
@@ -19,26 +20,28 @@ struct EarliestImpact {
   double begin = 1, end = 1;
 };
 
-/// Counts what a search for the earliest impact did with its candidates.
+/// Counts what a search for the earliest impact did with its candidates. candidates = culled + later + tests.
 struct EarliestImpactStats {
   std::uint64_t candidates = 0;
-  std::uint64_t later = 0;  ///< apart until an impact that was found before
-  ImpactStats impacts{};    ///< of all others
+  std::uint64_t culled = 0;  ///< of one patch, which does not touch itself during the motion
+  std::uint64_t later = 0;   ///< apart until an impact that was found before
+  ImpactStats impacts{};     ///< of all others
 };
 
 /// Takes the earlier of `earliest` and the first times at which candidates, face_vertex or edge_edge, are
 /// within the separation: exact verdicts by find_impact for a separation of 0, else by find_approach. Points
-/// are [vertex][4], at t = 0 and t = 1. The result does not depend on the order of candidates.
+/// are [vertex][4], at t = 0 and t = 1. The result does not depend on the order of candidates. Candidates
+/// within one of the `patches` are skipped; these must be certified for the motion, and the separation 0.
 template <class S>
 void take_earlier_impacts(CandidateKind kind, const Elements& elements, const S* begin, const S* end,
                           std::span<const Candidate> candidates, double separation, EarliestImpact& earliest,
-                          EarliestImpactStats* stats = nullptr);
+                          EarliestImpactStats* stats = nullptr, const PatchMembers* patches = nullptr);
 
 extern template void take_earlier_impacts(CandidateKind, const Elements&, const float*, const float*,
                                           std::span<const Candidate>, double, EarliestImpact&,
-                                          EarliestImpactStats*);
+                                          EarliestImpactStats*, const PatchMembers*);
 extern template void take_earlier_impacts(CandidateKind, const Elements&, const double*, const double*,
                                           std::span<const Candidate>, double, EarliestImpact&,
-                                          EarliestImpactStats*);
+                                          EarliestImpactStats*, const PatchMembers*);
 
 }  // namespace kbvh

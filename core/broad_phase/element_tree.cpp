@@ -20,7 +20,7 @@ void ElementTree<S>::start(const Primitives& elements, std::uint32_t leaf_size, 
   state_ = State::unbuilt;
   first_of_vertex_.clear();
   elements_of_vertex_.clear();
-  places_listed_ = groups_listed_ = false;
+  places_listed_ = groups_listed_ = contours_listed_ = false;
   work_ = {};
 }
 
@@ -75,7 +75,7 @@ void ElementTree<S>::build(const S* vertex_boxes) {
   list_corners();
   surface_when_built_ = surface();
   built_count_ = count;
-  places_listed_ = groups_listed_ = false;
+  places_listed_ = groups_listed_ = contours_listed_ = false;
   state_ = State::current;
   ++work_.builds;
 }
@@ -209,7 +209,7 @@ void ElementTree<S>::elements_removed(const S* vertex_boxes, std::span<const std
     }
     dirty_leaves_[leaf / 64] |= std::uint64_t(1) << leaf % 64;
   }
-  groups_listed_ = false;
+  groups_listed_ = contours_listed_ = false;
   if (state_ == State::current)
     remake_marked(vertex_boxes);
   else
@@ -250,6 +250,14 @@ GroupArrays ElementTree<S>::groups(std::span<const GroupMask> of_elements) {
 }
 
 template <class S>
+const FaceContours& ElementTree<S>::contours(std::uint32_t vertices) {
+  KBVH_ASSERT(corners_each_ == 3);
+  if (!contours_listed_) contours_.build(leaves(), tree_.node_count(), tree_.padded_leaf_size(), vertices);
+  contours_listed_ = true;
+  return contours_;
+}
+
+template <class S>
 ElementLeaves<S> ElementTree<S>::leaves() {
   KBVH_ASSERT(state_ == State::current && !tree_.empty());
   const WideLeafLists lists = tree_.leaf_lists();
@@ -259,7 +267,7 @@ ElementLeaves<S> ElementTree<S>::leaves() {
 
 template <class S>
 std::size_t ElementTree<S>::bytes() const {
-  return order_.bytes() + builder_.bytes() + tree_.bytes() +
+  return order_.bytes() + builder_.bytes() + tree_.bytes() + contours_.bytes() +
          (leaf_corners_.capacity() + leaf_ends_.capacity() + group_children_.capacity() +
           group_nodes_.capacity() + first_of_vertex_.capacity() + elements_of_vertex_.capacity() +
           leaf_of_element_.capacity() + node_of_leaf_.capacity() + parents_.capacity()) *

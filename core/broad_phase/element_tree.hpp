@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "core/broad_phase/face_contours.hpp"
 #include "core/broad_phase/kernels/element_boxes.hpp"
 #include "core/broad_phase/kernels/element_pairs.hpp"
 #include "core/broad_phase/kernels/group_traversal.hpp"
@@ -52,6 +53,9 @@ class ElementTree {
   /// must be current and not empty. O(elements) after a build or `forget_groups`, else O(1).
   GroupArrays groups(std::span<const GroupMask> of_elements);
   void forget_groups() { groups_listed_ = false; }
+  /// Returns the contours of the patches below the nodes of a tree over faces, which must be current and not
+  /// empty. After a build or a removal as expensive as a build, else O(1).
+  const FaceContours& contours(std::uint32_t vertices);
   bool empty() const { return tree_.empty(); }
   std::uint32_t padded_leaf_size() const { return tree_.padded_leaf_size(); }
   Box<S> root_box() const { return tree_.root_box(); }
@@ -101,6 +105,8 @@ class ElementTree {
   bool places_listed_ = false;
   UnfilledArray<std::uint32_t> group_children_, group_nodes_;
   bool groups_listed_ = false;
+  FaceContours contours_;
+  bool contours_listed_ = false;
   Work work_;
 };
 

@@ -23,6 +23,7 @@ void PairFilter::clear() {
   for (auto& groups : groups_) groups.clear();
   from_vertices_ = false;
   for (Excluded& excluded : excluded_) excluded.pairs.clear();
+  exclude_rings(0);
   function_ = nullptr;
 }
 
@@ -65,6 +66,12 @@ void PairFilter::elements_inserted(const Elements& elements) {
   }
 }
 
+void PairFilter::prepare(const Elements& elements) {
+  if (rings_ == 0 || rings_listed_) return;
+  connected_.build(elements, rings_);
+  rings_listed_ = true;
+}
+
 void PairFilter::exclude(const Elements& elements, CandidateKind kind, std::span<const Candidate> pairs) {
   const Element first = first_element(kind), second = second_element(kind);
   for (const Candidate& pair : pairs)
@@ -85,7 +92,7 @@ void PairFilter::exclude(const Elements& elements, CandidateKind kind, std::span
     excluded.first_pair[i] += excluded.first_pair[i - 1];
 }
 
-std::size_t PairFilter::keep(CandidateKind kind, std::span<Candidate> pairs) const {
+std::size_t PairFilter::keep(const Elements& elements, CandidateKind kind, std::span<Candidate> pairs) const {
   std::size_t count = pairs.size();
   const auto keep_if = [&](const auto& admitted) {
     std::size_t kept = 0;
@@ -102,6 +109,11 @@ std::size_t PairFilter::keep(CandidateKind kind, std::span<Candidate> pairs) con
     keep_if([&](const Candidate& pair) { return first[pair.first].admits({}); });
   else if (!second.empty())
     keep_if([&](const Candidate& pair) { return second[pair.second].admits({}); });
+  if (rings_ > 0)
+    keep_if([&](const Candidate& pair) {
+      return !connected_.connect(elements.vertices(first_element(kind), pair.first),
+                                 elements.vertices(second_element(kind), pair.second));
+    });
   const Excluded& excluded = excluded_[std::size_t(kind)];
   if (!excluded.pairs.empty())
     keep_if([&](const Candidate& pair) {
@@ -118,7 +130,7 @@ std::size_t PairFilter::keep(CandidateKind kind, std::span<Candidate> pairs) con
 }
 
 std::size_t PairFilter::bytes() const {
-  std::size_t total = 0;
+  std::size_t total = connected_.bytes();
   for (const auto& groups : groups_) total += groups.capacity() * sizeof(GroupMask);
   for (const Excluded& excluded : excluded_)
     total += excluded.first_pair.capacity() * sizeof(std::uint32_t) +

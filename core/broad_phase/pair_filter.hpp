@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/broad_phase/elements.hpp"
+#include "core/broad_phase/vertex_rings.hpp"
 
 namespace kbvh {
 
@@ -29,8 +30,8 @@ struct GroupMask {
 /// many pairs at a time, each with overlapping boxes and without a common vertex.
 using PairFunction = std::function<std::size_t(CandidateKind kind, std::span<Candidate> pairs)>;
 
-/// The pairs of elements that may be candidates at all: groups and masks, excluded pairs, and a function of
-/// the caller. All of them together decide; incidence is no matter of this filter.
+/// The pairs of elements that may be candidates at all: groups and masks, rings, excluded pairs, and a
+/// function of the caller. All of them together decide; incidence is no matter of this filter.
 class PairFilter {
  public:
   /// Ends all filters. Keeps memory.
@@ -53,19 +54,34 @@ class PairFilter {
   /// kind may be given in any order. Throws std::invalid_argument for an id that does not exist.
   void exclude(const Elements& elements, CandidateKind kind, std::span<const Candidate> pairs);
 
+  /// Excludes pairs of elements that at most `rings` edges connect: VertexRings says which. 0 ends this.
+  void exclude_rings(std::uint32_t rings) {
+    rings_ = rings;
+    rings_listed_ = false;
+  }
+  std::uint32_t rings() const { return rings_; }
+  /// Takes other connections of vertices: rings are listed again by the next `prepare`.
+  void connections_changed() { rings_listed_ = false; }
+  /// Lists rings, if they are asked for and not listed; before the first `keep`. Throws as
+  /// VertexRings::build does.
+  void prepare(const Elements& elements);
+
   /// Takes further elements: with the default groups, or the union of their vertices'.
   void elements_inserted(const Elements& elements);
 
+  /// Returns whether there is a function of the caller, which only the caller's thread may call. All other
+  /// filters allow calls of `keep` by several threads.
+  bool has_function() const { return bool(function_); }
   /// Sets the caller's function; an empty one ends it.
   void set_function(PairFunction function) { function_ = std::move(function); }
 
   /// Returns whether any filter looks at single pairs of a kind.
   bool looks_at(CandidateKind kind) const {
-    return has_groups(kind) || !excluded_[std::size_t(kind)].pairs.empty() || function_;
+    return has_groups(kind) || rings_ > 0 || !excluded_[std::size_t(kind)].pairs.empty() || function_;
   }
   /// Moves the pairs that are admitted to the front and returns their number. Throws std::out_of_range if the
   /// caller's function returns more pairs than it got, and lets its exceptions pass.
-  std::size_t keep(CandidateKind kind, std::span<Candidate> pairs) const;
+  std::size_t keep(const Elements& elements, CandidateKind kind, std::span<Candidate> pairs) const;
 
   std::size_t bytes() const;
 
@@ -77,6 +93,9 @@ class PairFilter {
   std::array<std::vector<GroupMask>, element_kinds> groups_;
   bool from_vertices_ = false;  ///< edges and faces have the groups of their vertices
   std::array<Excluded, 6> excluded_;
+  std::uint32_t rings_ = 0;
+  bool rings_listed_ = false;
+  VertexRings connected_;
   PairFunction function_;
 };
 

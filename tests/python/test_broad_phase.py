@@ -114,6 +114,25 @@ class Filters(unittest.TestCase):
         broad.clear_filters()
         self.assertEqual(pairs(broad.candidates("edge_edge")), every)
 
+    def test_rings_and_self_intersections(self):
+        v, edges, faces = sheet(10, 6)
+        broad = kbvh.BroadPhase()
+        broad.build(v, edges, faces, radius=0.125)
+        connected = np.eye(len(v), dtype=bool)
+        connected[edges[:, 0], edges[:, 1]] = connected[edges[:, 1], edges[:, 0]] = True
+        broad.exclude_rings(1)
+        for kind, elements in (("edge_edge", edges), ("face_face", faces)):
+            expected = {(a, b) for a, b in all_pairs(kind, v, edges, faces, 0.125)
+                        if not connected[np.ix_(elements[a], elements[b])].any()}  # fmt: skip
+            self.assertEqual(pairs(broad.candidates(kind)), expected)
+        broad.exclude_rings(0)
+        touching = pairs(broad.self_intersections())
+        self.assertGreater(len(touching), 0)
+        self.assertEqual(touching, pairs(broad.within("face_face", 0.0)))
+        broad.use_threads(1)
+        with self.assertRaisesRegex(ValueError, "0 threads"):
+            broad.use_threads(0)
+
     def test_functions_that_fail(self):
         v, edges, faces = sheet(10, 6)
         broad = kbvh.BroadPhase()

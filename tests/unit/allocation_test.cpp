@@ -394,6 +394,8 @@ std::uint64_t allocations_of_a_round(BroadPhase<S>& broad, CandidateBuffer& foun
   const std::vector<Candidate> excluded{{1, 500}, {40, 2}};
   const std::uint64_t before = allocations;
   const auto ask = [&] {
+    for (const SelfCulling culling : {SelfCulling::none, SelfCulling::cones})
+      broad.self_intersections(found, culling);
     for (const CandidateKind kind : candidate_kinds) {
       broad.detect(kind, found);
       broad.within(kind, S(0.05), found);
@@ -417,6 +419,7 @@ std::uint64_t allocations_of_a_round(BroadPhase<S>& broad, CandidateBuffer& foun
   ask();
   broad.set_vertex_groups(groups);
   broad.exclude(CandidateKind::edge_edge, excluded);
+  broad.exclude_rings(2);
   ask();
   broad.clear_filters();
   return allocations - before;

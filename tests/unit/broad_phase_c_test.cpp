@@ -147,6 +147,35 @@ TEST(BroadPhaseInC, FiltersAndEdits) {
   EXPECT_EQ(wrong([](const Candidate&) { return false; }), "");
   ASSERT_EQ(kbvh_broad_phase_set_vertex_groups(broad.get(), nullptr, 0), 0);
   EXPECT_EQ(wrong([](const Candidate&) { return true; }), "");
+  // Edges that one edge connects, by definition: an end of one next to an end of the other.
+  std::set<std::pair<std::int32_t, std::int32_t>> next;
+  for (std::size_t e = 0; e < mesh.edges.size(); e += 2) {
+    next.insert({mesh.edges[e], mesh.edges[e + 1]});
+    next.insert({mesh.edges[e + 1], mesh.edges[e]});
+  }
+  ASSERT_EQ(kbvh_broad_phase_exclude_rings(broad.get(), 1), 0);
+  EXPECT_EQ(
+      wrong([&](const Candidate& pair) {
+        bool connected = false;
+        for (const std::size_t i : {0U, 1U})
+          for (const std::size_t j : {0U, 1U})
+            connected |= next.contains({mesh.edges[2 * pair.first + i], mesh.edges[2 * pair.second + j]});
+        return !connected;
+      }),
+      "");
+  ASSERT_EQ(kbvh_broad_phase_exclude_rings(broad.get(), 0), 0);
+  // Self intersections are the faces at a distance of 0.
+  const std::uint32_t* within = nullptr;
+  std::size_t within_count = 0;
+  ASSERT_EQ(kbvh_broad_phase_within(broad.get(), KBVH_FACE_FACE, 0, &within, &within_count), 0);
+  const CandidateBuffer touching = list_of(within, within_count);
+  ASSERT_EQ(kbvh_broad_phase_self_intersections(broad.get(), &pairs, &count), 0);
+  EXPECT_EQ(difference(list_of(pairs, count), Pairs(touching.begin(), touching.end()), mesh.elements(),
+                       CandidateKind::face_face),
+            "");
+  EXPECT_NE(kbvh_broad_phase_self_intersections(broad.get(), nullptr, &count), 0);
+  EXPECT_EQ(kbvh_broad_phase_use_threads(broad.get(), 1), 0);
+  EXPECT_NE(kbvh_broad_phase_use_threads(broad.get(), 0), 0);
   // Edges go, and changes say so; others come.
   const std::uint32_t *begun = nullptr, *ended = nullptr;
   std::size_t begun_count = 0, ended_count = 0;

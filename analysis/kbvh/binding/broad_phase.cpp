@@ -159,6 +159,14 @@ class PythonBroadPhase {
       throw std::invalid_argument("the excluded pairs have to have the shape (n, 2)");
     check(kbvh_broad_phase_exclude(handle_.get(), kind_of(kind), ids.span().data(), ids.span().size() / 2));
   }
+  void use_threads(std::uint32_t threads) { check(kbvh_broad_phase_use_threads(handle_.get(), threads)); }
+  void exclude_rings(std::uint32_t rings) { check(kbvh_broad_phase_exclude_rings(handle_.get(), rings)); }
+  py::array self_intersections() {
+    const std::uint32_t* pairs = nullptr;
+    std::size_t count = 0;
+    check(kbvh_broad_phase_self_intersections(handle_.get(), &pairs, &count));
+    return copied(pairs, count);
+  }
   void keep_only(const py::object& choose) {
     auto choice = choose.is_none() ? nullptr : std::make_unique<PairChoice>(choose);
     check(kbvh_broad_phase_keep_only(handle_.get(), choice ? &PairChoice::keep : nullptr, choice.get()));
@@ -241,6 +249,9 @@ void bind_broad_phase(py::module_& module) {
       .def("set_groups", method(&PythonBroadPhase::set_groups), arg("element"), arg("groups"), arg("masks"))
       .def("set_vertex_groups", method(&PythonBroadPhase::set_vertex_groups), arg("groups"), arg("masks"))
       .def("exclude", method(&PythonBroadPhase::exclude), arg("kind"), arg("pairs"))
+      .def("use_threads", method(&PythonBroadPhase::use_threads), arg("threads"))
+      .def("exclude_rings", method(&PythonBroadPhase::exclude_rings), arg("rings"))
+      .def("self_intersections", method(&PythonBroadPhase::self_intersections))
       .def("keep_only", method(&PythonBroadPhase::keep_only), arg("choose"))
       .def("clear_filters", method(&PythonBroadPhase::clear_filters))
       .def("changes", method(&PythonBroadPhase::changes), arg("kind"), arg("distance"))
