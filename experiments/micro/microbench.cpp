@@ -9,6 +9,7 @@
 #include "core/families/events/event_queue.hpp"
 #include "core/families/events/segment_queue.hpp"
 #include "core/families/wide/wide_hierarchy.hpp"
+#include "core/families/wide/wide_probes.hpp"
 #include "core/families/wide/wide_query.hpp"
 #include "core/geometry/triangle_batch.hpp"
 #include "core/geometry/triangle_triangle.hpp"
@@ -101,6 +102,50 @@ void overlap(benchmark::State& state, KernelSet kernels) {
     of_one = tests - before;
   }
   report_each(state, double(of_one), "box_test");
+}
+
+enum class RayOrder : std::uint8_t {
+  rows,    ///< of a camera's pixels
+  tiles,   ///< of 8 x 8 pixels
+  random,  ///< from anywhere to anywhere
+};
+
+std::vector<Ray<float>> rays_at_a_sheet(RayOrder order) {
+  constexpr std::uint32_t side = 96;
+  std::mt19937 random(1);
+  const auto share = [&] { return float(random() >> 8) / float(1 << 24); };
+  std::vector<Ray<float>> rays;
+  for (std::uint32_t i = 0; i < side * side; ++i) {
+    const std::uint32_t tile = i / 64, x = order == RayOrder::rows ? i % side : tile % 12 * 8 + i % 8,
+                        y = order == RayOrder::rows ? i / side : tile / 12 * 8 + i / 8 % 8;
+    Ray<float> ray{{1.9F, -1.2F, 1.1F}, {}};
+    const float at[3] = {float(x) / side, float(y) / side, 0};
+    for (int axis = 0; axis < 3; ++axis) {
+      if (order == RayOrder::random) ray.origin[axis] = axis == 2 ? 0.2F * share() - 0.1F : share();
+      ray.direction[axis] = order == RayOrder::random ? share() - 0.5F : at[axis] - ray.origin[axis];
+    }
+    rays.push_back(ray);
+  }
+  return rays;
+}
+
+/// The closest hits of rays on a sheet of 64,800 triangles.
+void closest_hits(benchmark::State& state, RayOrder order, KernelSet kernels) {
+  Scene<float> scene;
+  scene.bodies.push_back(sheet(180, 0, 1));
+  const SceneView<float> view(scene);
+  Playback<float> playback(scene);
+  playback.evaluate_all();
+  WideHierarchy<float> hierarchy = hierarchy_of(scene.bodies[0], playback.positions(0), 8, 16, kernels);
+  hierarchy.refit(playback.positions(0));
+  WideProbes<float> probes(view, SampledMotion<float>(playback));
+  const std::vector<Ray<float>> rays = rays_at_a_sheet(order);
+  std::vector<RayHit> hits(rays.size());
+  TriangleTestStats stats;
+  std::uint64_t tests = 0;
+  const auto side_of = [&](std::uint32_t body) -> WideSide<float> { return {&hierarchy, body}; };
+  for (auto _ : state) probes.answer(RayProbes<float>{RayQuery::closest, rays, hits}, side_of, stats, tests);
+  report_each(state, double(rays.size()), "ray");
 }
 
 void build(benchmark::State& state, BuildMethod method) {
@@ -204,6 +249,11 @@ void register_all() {
                 .c_str(),
             [=](benchmark::State& state) { refit(state, width, leaf_size, kernels); });
     RegisterBenchmark(("overlap/" + set).c_str(), [=](benchmark::State& state) { overlap(state, kernels); });
+    for (const auto& [order, word] :
+         {std::pair(RayOrder::rows, "rows"), {RayOrder::tiles, "tiles"}, {RayOrder::random, "random"}})
+      RegisterBenchmark(
+          ("rays/" + set + "/" + word).c_str(),
+          [order = order, kernels](benchmark::State& state) { closest_hits(state, order, kernels); });
   }
   for (const BuildMethod method : {BuildMethod::median, BuildMethod::sah, BuildMethod::morton})
     RegisterBenchmark((std::string("build/") + name(method)).c_str(),

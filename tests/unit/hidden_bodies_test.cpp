@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "core/families/wide/wide_hierarchy.hpp"
 #include "core/families/wide/wide_probes.hpp"
 #include "core/judge/probe_oracle.hpp"
 #include "core/topology/builders.hpp"

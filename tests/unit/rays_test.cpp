@@ -12,7 +12,7 @@
 #include <optional>
 #include <random>
 
-#include "core/families/wide/wide_probes.hpp"
+#include "core/families/wide/wide_rays.hpp"
 #include "core/geometry/ray_box.hpp"
 #include "core/judge/probe_oracle.hpp"
 #include "core/topology/builders.hpp"

@@ -1,11 +1,11 @@
 #pragma once
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
-#include "core/families/wide/kernels/wide_rays.hpp"
-#include "core/families/wide/wide_hierarchy.hpp"
 #include "core/families/wide/wide_query.hpp"
+#include "core/families/wide/wide_tree.hpp"
 #include "core/scene/probes.hpp"
 
 namespace kbvh {
@@ -33,12 +33,18 @@ struct RayWork {
   std::uint64_t rays = 0;   ///< that entered it
 };
 
+/// Makes the boxes of the children of a body's wide node and clears the node's mark.
+struct WideBoxMaker {
+  void* context = nullptr;
+  void (*call)(void* context, std::uint32_t body, std::uint32_t node) = nullptr;
+  void operator()(std::uint32_t body, std::uint32_t node) const { call(context, body, node); }
+};
+
+template <class S>
+class WideRays;
+
 /// Answers probes over the wide hierarchies of all bodies of a scene; keeps its buffers from call to call.
-///
-/// For rays, a tree over the bodies' boxes, refitted at each call and rebuilt when the bodies have mixed,
-/// leads to the bodies, which are searched nearest first. This is occlusion culling: a body behind the hits
-/// of all rays is never searched, its positions are not fetched, and none of its stale boxes are made. Other
-/// probes search body by body.
+/// Rays have a traversal of their own (core/families/wide/wide_rays.hpp); other probes search body by body.
 template <class S>
 class WideProbes {
  public:
@@ -56,10 +62,9 @@ class WideProbes {
               std::uint64_t& tests, RayBodies* bodies = nullptr) {
     sides_.clear();
     for (std::uint32_t body = 0; body < scene_.body_count(); ++body) sides_.push_back(side_of(body));
-    make_context_ = const_cast<Make*>(&make);
-    make_ = [](void* context, std::uint32_t body, std::uint32_t node) {
-      (*static_cast<const Make*>(context))(body, node);
-    };
+    make_ = {const_cast<Make*>(&make), [](void* context, std::uint32_t body, std::uint32_t node) {
+               (*static_cast<const Make*>(context))(body, node);
+             }};
     run(probes, stats, tests, bodies);
   }
   /// Does the same for hierarchies whose boxes are all current.
@@ -72,7 +77,7 @@ class WideProbes {
 
   /// Rebuilds the tree over the bodies at the next call, so that a restarted clip costs the same as the first
   /// run.
-  void start_over() { built_area_ = -1; }
+  void start_over();
 
   /// Returns the work of the last call's rays in each body; 0 for other probes.
   std::span<const RayWork> work() const { return work_; }
@@ -81,43 +86,21 @@ class WideProbes {
 
  private:
   void run(const Probes<S>& probes, TriangleTestStats& stats, std::uint64_t& tests, RayBodies* bodies);
-  void run(const RayProbes<S>& rays, TriangleTestStats& stats);
   /// Answers any probes body by body, without a kernel of their own.
   template <class Kind>
-  void run_by_body(const Kind& probes, TriangleTestStats& stats);
+  void run_by_body(const Kind& probes, TriangleTestStats& stats, std::uint64_t& tests);
   /// Follows one search through one body.
   template <class Search>
-  void search_body(std::uint32_t body, Search& search, TriangleTestStats& stats);
-  void refit_bodies();
-  void count_bodies(std::span<const Ray<S>> rays, RayBodies& bodies) const;
-  /// Returns bit i unless rays[i] certainly misses all bodies; takes at most as many rays as a block has.
-  std::uint64_t screen(std::span<const Ray<S>> rays);
-  void follow(const WideTree<S>& tree, WideRayJob<S>& job, std::vector<WideRayItem<S>>& stack);
-  /// Follows the current ray through one body. Returns whether the search has ended.
-  bool enter(std::uint32_t body);
+  void search_body(std::uint32_t body, Search& search, TriangleTestStats& stats, std::uint64_t& tests);
 
   SceneView<S> scene_;
   SampledMotion<S> motion_;
   std::vector<WideProbeSide<S>> sides_;
   std::vector<RayWork> work_;  ///< [body], by this call
-  void* make_context_ = nullptr;
-  void (*make_)(void* context, std::uint32_t body, std::uint32_t node) = nullptr;
-  // The tree over bodies: one primitive of two corners for each body that rays can meet.
-  WideHierarchy<S> bodies_;
-  Primitives primitives_;
-  std::vector<std::uint32_t> ids_;  ///< of the bodies in the tree
-  std::vector<S> corners_;          ///< [primitive][lower, upper][3], one scalar past the end
-  double built_area_ = -1;          ///< sum over its nodes when it was built; negative: to be built
-  std::vector<WideRayItem<S>> body_stack_, stack_;
+  WideBoxMaker make_;
+  std::unique_ptr<WideRays<S>> rays_;
   std::vector<std::uint32_t> nodes_;   ///< to be visited by `search_body`
   std::vector<std::uint8_t> entered_;  ///< [body], of this call, if it is no call of rays
-  WideRayBlock<S> block_{};
-  // The current ray.
-  WideRay<S> ray_{};
-  RaySearch<S>* search_ = nullptr;
-  std::uint32_t body_ = 0;
-  TriangleTestStats* stats_ = nullptr;
-  std::uint64_t tests_ = 0;
 };
 
 extern template class WideProbes<float>;
