@@ -23,6 +23,7 @@ void add_scene(CLI::App& program, Action& action);
 void add_theory(CLI::App& program, Action& action);
 void add_stress(CLI::App& program, Action& action);
 void add_ccd(CLI::App& program, Action& action);
+void add_loop(CLI::App& program, Action& action);
 void add_lab(CLI::App& program, Action& action);
 void add_data(CLI::App& program, Action& action);
 

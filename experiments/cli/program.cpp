@@ -141,6 +141,7 @@ int run_program(int argc, const char* const* argv) {
   add_theory(program, action);
   add_stress(program, action);
   add_ccd(program, action);
+  add_loop(program, action);
   add_lab(program, action);
   add_data(program, action);
   // CLI11 would only say that a command is missing.

@@ -6,7 +6,7 @@ namespace kbvh::experiments::binary_test {
 namespace {
 
 TEST_F(Binary, HelpHasExamples) {
-  for (const char* command : {"list", "run", "bench", "report", "scene", "theory", "lab", "ccd", "data"}) {
+  for (const char* command : {"list", "run", "bench", "report", "scene", "theory", "loop", "lab", "ccd", "data"}) {
     const Outcome help = kbvh(std::string(command) + " --help");
     EXPECT_EQ(help.code, 0);
     EXPECT_NE(help.out.find("Example"), std::string::npos) << command;

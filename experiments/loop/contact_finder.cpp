@@ -1,0 +1,140 @@
+#include "experiments/loop/contact_finder.hpp"
+
+#include <chrono>
+#include <stdexcept>
+
+#include "experiments/common/stopwatch.hpp"
+#include "experiments/common/text.hpp"
+
+namespace kbvh::experiments::loop {
+namespace {
+
+/// Groups of vertices: those of fixed ones pair with others only.
+constexpr GroupMask moving_group{1, ~std::uint32_t(0)}, fixed_group{2, ~std::uint32_t(2)};
+
+/// Returns whether the seeded fault takes a pair.
+bool is_lost(CandidateKind kind, const Candidate& pair, std::uint32_t every) {
+  std::uint64_t z = (std::uint64_t(pair.first) << 32 | pair.second) * 8 + std::uint64_t(kind);
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
+  return (z ^ (z >> 31)) % every == 0;
+}
+
+}  // namespace
+
+const char* name(Detection detection) {
+  switch (detection) {
+    case Detection::anew:
+      return "anew";
+    case Detection::refit:
+      return "refit";
+    case Detection::kept:
+      break;
+  }
+  return "kept";
+}
+
+Detection detection(const std::string& word) {
+  std::vector<std::string> known;
+  for (const Detection one : {Detection::anew, Detection::refit, Detection::kept}) {
+    if (word == name(one)) return one;
+    known.emplace_back(name(one));
+  }
+  throw std::invalid_argument(no_such("way to detect", word, known));
+}
+
+ContactMesh::ContactMesh(const SimulatedMesh& mesh)
+    : vertices(mesh.vertex_count()),
+      edges(mesh.edges),
+      faces(mesh.faces),
+      fixed(mesh.fixed),
+      inner(mesh.inner) {}
+
+IterateDetector::IterateDetector(const ContactMesh& mesh, const Settings& settings)
+    : mesh_(mesh), settings_(settings) {
+  if ((settings.detection == Detection::kept) != (settings.keep > 0))
+    throw std::invalid_argument(
+        "a bound on displacements belongs to the way 'kept', and must be positive there");
+}
+
+void IterateDetector::build(const Positions& x) {
+  broad_.build(x, mesh_.edges, mesh_.faces, settings_.radius);
+  broad_.remove(Element::vertex, mesh_.inner);
+  std::vector<GroupMask> groups;
+  for (const std::uint8_t fixed : mesh_.fixed) groups.push_back(fixed != 0 ? fixed_group : moving_group);
+  broad_.set_vertex_groups(groups);
+  if (settings_.lose_every > 0)
+    broad_.keep_if([every = settings_.lose_every](CandidateKind kind, const Candidate& pair) {
+      return !is_lost(kind, pair, every);
+    });
+  if (settings_.detection == Detection::kept) broad_.valid_for(settings_.keep);
+}
+
+void IterateDetector::update(const Positions& x) {
+  if (!broad_.built()) return build(x);
+  if (settings_.detection == Detection::anew) broad_.forget_trees();
+  broad_.update(x);
+}
+
+void IterateDetector::update(const Positions& x, const Positions& end) {
+  if (!broad_.built()) build(x);
+  if (settings_.detection == Detection::anew) broad_.forget_trees();
+  broad_.update(x, end);
+}
+
+ContactFinder::ContactFinder(const ContactMesh& mesh, const IterateDetector::Settings& settings,
+                             IterateSink* sink)
+    : mesh_(mesh), detector_(mesh, settings), sink_(sink) {}
+
+ContactFinder::Pair ContactFinder::pair_of(ContactKind kind, const Candidate& candidate) const {
+  const auto a = Eigen::Index(candidate.first), b = Eigen::Index(candidate.second);
+  if (kind == ContactKind::face_vertex)
+    return {kind,
+            candidate.first,
+            candidate.second,
+            {candidate.second, mesh_.faces(a, 0), mesh_.faces(a, 1), mesh_.faces(a, 2)}};
+  return {kind,
+          candidate.first,
+          candidate.second,
+          {mesh_.edges(a, 0), mesh_.edges(a, 1), mesh_.edges(b, 0), mesh_.edges(b, 1)}};
+}
+
+void ContactFinder::search() {
+  work_.candidates += broad().candidates(CandidateKind::face_vertex).size();
+  work_.candidates += broad().candidates(CandidateKind::edge_edge).size();
+  ++work_.questions;
+}
+
+void ContactFinder::look_at(const Positions& x) {
+  const auto begin = std::chrono::steady_clock::now();
+  detector_.update(x);
+  search();
+  work_.searches = broad().detections();
+  work_.detect_seconds += seconds_since(begin);
+}
+
+double ContactFinder::look_along(std::uint32_t iterate, const Positions& x, const Positions& end,
+                                 double separation) {
+  if (sink_ != nullptr) sink_->take(iterate, x, end);
+  const auto begin = std::chrono::steady_clock::now();
+  detector_.update(x, end);
+  search();
+  work_.detect_seconds += seconds_since(begin);
+  const auto searched = std::chrono::steady_clock::now();
+  double part = 1;
+  EarliestImpact impact = broad().earliest_impact(separation);
+  // A time of impact is enclosed to 2^-20 of the motion: where that is too coarse, a shorter part is asked
+  // about.
+  while (impact.touches && impact.begin < 0x1p-10 && part > 1e-12) {
+    part *= 0x1p-9;
+    part_ = x + part * (end - x);
+    detector_.update(x, part_);
+    impact = broad().earliest_impact(separation);
+  }
+  work_.impact_seconds += seconds_since(searched);
+  work_.searches = broad().detections();
+  if (part <= 1e-12) return 0;
+  return impact.touches ? 0.9 * impact.begin * part : part;
+}
+
+}  // namespace kbvh::experiments::loop
