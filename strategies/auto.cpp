@@ -137,6 +137,7 @@ class Auto final : public OneOfMany<S>,
     const ChoiceCandidate* candidate;
     ReportsWork* work;
     double searched_until = 0;  ///< end of the segment of its last search
+    int frames = 1;             ///< of its last unit
   };
   static constexpr double never = std::numeric_limits<double>::infinity();
   /// Frames after which the surfaces of boxes are looked at again, and of the longest unit.
@@ -154,6 +155,7 @@ class Auto final : public OneOfMany<S>,
       started_at_ = this->frame() + 1;
       runners_[next].searched_until = -never;
     }
+    if (policy_->begins()) runners_[next].frames = offers_[next].frames;
     Base::answer_by(next, t);
     begin_frame(t);
   }
@@ -170,10 +172,12 @@ class Auto final : public OneOfMany<S>,
     this->step_back();
     answer_by(policy_->stopped(work), t);
   }
+  /// A join that can be stopped takes longer, so its search is watched only where it may reach the limit.
   void stop_endless_join(double t) {
-    if (is_join() && policy_->state() != ChoiceState::stopped &&
-        !runner().work->searches_within(most_box_tests()))
-      stop(t);
+    if (!is_join() || policy_->state() == ChoiceState::stopped) return;
+    const double usual = runner().frames * policy_->estimate(policy_->active());
+    if (usual < policy_->limit() / 4 || runner().work->searches_within(most_box_tests())) return;
+    stop(t);
   }
 
   // ---- Counted work
@@ -183,7 +187,6 @@ class Auto final : public OneOfMany<S>,
     ray_tests_ = candidates_ = 0;
     span_tests_ = runner().work->span_tests();
     frame_tests_ = runner().work->frame_tests();
-    fetched_ = this->sampled_.fetched();
     // The search of a join serves a segment; after its end, the next frame searches again.
     searches_ = !is_join() || t > runner().searched_until;
     if (searches_) runner().searched_until = segment_end_;
@@ -206,8 +209,7 @@ class Auto final : public OneOfMany<S>,
       seen_.candidates = candidates_;
       query += price().box_test * (searches_ ? double(work.last_box_tests()) : 0) +
                price().candidate * candidates_ + price().span_test * double(work.span_tests() - span_tests_) +
-               price().triangle_test * double(work.frame_tests() - frame_tests_) +
-               price().fetch * double(this->sampled_.fetched() - fetched_);
+               price().triangle_test * double(work.frame_tests() - frame_tests_);
     }
     if (price().build > 0) {
       const bool known = this->frame() - started_at_ >= frames_of_unit;
@@ -227,11 +229,9 @@ class Auto final : public OneOfMany<S>,
     if (std::exchange(plans_changed_, false) || t >= segment_end_) {
       segment_begin_ = -never;
       segment_end_ = never;
-      seen_.translates = true;
       for (std::uint32_t body = 0; body < this->scene_.body_count(); ++body) {
         segment_begin_ = std::max(segment_begin_, motion_.lines_begin(body));
         segment_end_ = std::min(segment_end_, motion_.lines_end(body));
-        seen_.translates = seen_.translates && (!this->scene_.moving(body) || motion_.translation(body));
       }
       seen_.frames = step_ > 0 ? std::max(1.0, (segment_end_ - segment_begin_) / step_) : never;
     }
@@ -268,8 +268,11 @@ class Auto final : public OneOfMany<S>,
   /// Returns the frames that a candidate could answer from this one on with one unit.
   int frames_of(std::size_t runner, double t) const {
     const ChoiceUnit unit = runners_[runner].candidate->unit;
+    // Rays meet the same trees with slabs and without; they do not show the work of those that are no trees.
+    const bool by_rays =
+        unit == ChoiceUnit::frame && (runner == ChoicePolicy::refit || !refits(runners_[runner]));
+    if (only_rays_ && !by_rays) return 0;
     if (unit == ChoiceUnit::frame) return 1;
-    if (only_rays_) return 0;  // these do not show the work of the others
     if (unit == ChoiceUnit::frames) return frames_of_unit;
     // A search for the last frames of a segment takes as long as one for all of it.
     const bool begins = runner == policy_->active() || t - segment_begin_ <= 1.5 * step_;
@@ -289,7 +292,7 @@ class Auto final : public OneOfMany<S>,
   // Of the current frame; the counts are those at its beginning.
   bool searches_ = false, asked_ = false, pairs_asked_ = false, only_rays_ = false;
   double ray_tests_ = 0, candidates_ = 0;
-  std::uint64_t span_tests_ = 0, frame_tests_ = 0, fetched_ = 0;
+  std::uint64_t span_tests_ = 0, frame_tests_ = 0;
 };
 
 }  // namespace

@@ -161,8 +161,8 @@ TEST(Auto, DoesNotRebuildTreesThatStayYoung) {
 TEST(Auto, LeavesSlabsThatDoNotPay) {
   // Where nothing is connected, a pair of leaves has few candidates that a slab could leave out.
   const std::string choice = chosen_at_keyframes(flying_triangles(2000, 50, Flight::outwards, 0.1), 49);
-  EXPECT_LE(frames_of(choice, "leaf_slabs"), 1) << choice;
-  EXPECT_GE(frames_of(choice, "bottom_up"), 48) << choice;
+  EXPECT_LE(frames_of(choice, "leaf_slabs"), 6) << choice;
+  EXPECT_GE(frames_of(choice, "bottom_up"), 43) << choice;
 }
 
 TEST(Auto, StartsOverAndChoosesTheSameAgain) {
@@ -214,7 +214,7 @@ TEST(Auto, ChoosesTheSameWhereItIsTimed) {
     choices[use == Use::timed] = session.strategy().choice();
   }
   EXPECT_EQ(choices[0], choices[1]);
-  EXPECT_NE(choices[0].find("interval_join"), std::string::npos) << choices[0];
+  EXPECT_NE(choices[0].find("lbvh_drift"), std::string::npos) << choices[0];
 }
 
 TEST(NestedStrategies, KnowNoMoreOfTheFutureThanTheirOwner) {

@@ -14,7 +14,6 @@ struct Observed {
   double frames = 1;              ///< per segment of the plans
   double changes_per_frame = 0;   ///< frames with changes of plans, as a share of the last frames
   double growth = 1, ageing = 0;  ///< of refitted boxes: surfaces over those at the start; search per frame
-  bool translates = false;        ///< each body moves as a whole in this segment
 };
 
 /// What a candidate answers at once.
@@ -31,7 +30,7 @@ struct ChoiceCandidate {
     double frame = 0, body = 0;  ///< of a frame, and of each moving body in it
     double read = 0;             ///< of each vertex that a refit reads: in a frame, or once for a segment
     double box_test = 0, candidate = 0;
-    double span_test = 0, triangle_test = 0, fetch = 0;  ///< of a join
+    double span_test = 0, triangle_test = 0;  ///< of a join
     double build = 0;  ///< of a primitive, at the start and when a tree has aged; 0: no trees are built
     double cold = 0;   ///< of a primitive, in the first frame since `reset`: memory that is not warm
   };
