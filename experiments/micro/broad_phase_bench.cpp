@@ -1,7 +1,6 @@
 // The time of kbvh::broad_phase relative to other ways to the same pairs, in one run and by turns: swept
 // vertex-face and edge-edge candidates between two frames from scratch and with a known tree, iterates within
-// a bound, updates of few vertices, candidates between groups, and self intersections of cloth with cones and
-// without. Prints medians of processor time in ms and
+// a bound, updates of few vertices, and candidates between groups. Prints medians of processor time in ms and
 // ratios, and compares them with targets; FILE receives all times, ratios and targets.
 //   kbvh_broad_phase_bench [FRAMES] [REPETITIONS] [FILE]
 // FRAMES is a folder with a pair of frames (default: cloth-ball of the data folder).
@@ -9,9 +8,14 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <exception>
+#include <ctime>
 #include <filesystem>
+#include <fstream>
+#include <functional>
+#include <map>
+#include <nlohmann/json.hpp>
 #include <numeric>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -19,13 +23,113 @@
 #include "core/families/sweep/sorted_boxes.hpp"
 #include "core/judge/session.hpp"
 #include "experiments/common/environment.hpp"
-#include "experiments/micro/self_intersections.hpp"
-#include "experiments/micro/turns_table.hpp"
+#include "experiments/common/machine.hpp"
 #include "experiments/study/box_candidates.hpp"
 #include "experiments/study/contestants.hpp"
 
 namespace kbvh::experiments {
 namespace {
+
+/// The processor's time of this program, which has one thread: other programs disturb it least.
+double milliseconds() {
+  return 1e3 * double(std::clock()) / CLOCKS_PER_SEC;
+}
+
+/// Work that is timed by turns with its rivals.
+struct Contestant {
+  std::string name;
+  std::function<std::size_t()> work;  ///< returns the number of pairs
+  std::vector<double> ms{};
+  std::size_t pairs = 0;
+};
+
+/// What was compared in this run, for the file and for targets.
+class Table {
+ public:
+  /// Plays all contestants once without a clock, then by turns, and prints medians and how many times as long
+  /// as the first each one takes.
+  void compare(const std::string& title, std::vector<Contestant> contestants, int repetitions) {
+    for (int r = -1; r < repetitions; ++r)
+      for (Contestant& contestant : contestants) {
+        const double begin = milliseconds();
+        contestant.pairs = contestant.work();
+        const double took = milliseconds() - begin;
+        if (r >= 0) contestant.ms.push_back(took);
+      }
+    std::printf("%s\n", title.c_str());
+    nlohmann::json rows = nlohmann::json::array();
+    double first = 0;
+    for (Contestant& contestant : contestants) {
+      std::sort(contestant.ms.begin(), contestant.ms.end());
+      const double median = contestant.ms[contestant.ms.size() / 2];
+      if (first == 0) first = median;
+      medians_[contestant.name] = median;
+      std::printf("  %-56s %10.3f ms  %7.2f x  %zu pairs\n", contestant.name.c_str(), median, median / first,
+                  contestant.pairs);
+      rows.push_back({{"name", contestant.name},
+                      {"median_ms", median},
+                      {"ms", contestant.ms},
+                      {"over_first", median / first},
+                      {"pairs", contestant.pairs}});
+    }
+    comparisons_.push_back({{"title", title}, {"contestants", rows}});
+  }
+
+  /// Compares how many times as long as `ours` the rival takes with what is at least asked for, and with the
+  /// aim; 0: none is. Does nothing if one of them was not measured.
+  void target(const char* what, const std::string& ours, const std::string& rival, double at_least,
+              double aim) {
+    if (!medians_.contains(ours) || !medians_.contains(rival)) return;
+    const double ratio = medians_.at(rival) / medians_.at(ours);
+    const char* const verdict = at_least == 0      ? "reported"
+                                : ratio < at_least ? "missed"
+                                : ratio < aim      ? "met"
+                                                   : "met, and the aim";
+    targets_.push_back({{"what", what},
+                        {"ours", ours},
+                        {"rival", rival},
+                        {"ratio", ratio},
+                        {"at_least", at_least},
+                        {"aim", aim},
+                        {"verdict", verdict}});
+  }
+  void not_measured(const char* what, const char* why) {
+    targets_.push_back({{"what", what}, {"ratio", nullptr}, {"verdict", "not measured"}, {"why", why}});
+  }
+
+  void print_targets() const {
+    std::printf("Targets\n");
+    for (const nlohmann::json& target : targets_) {
+      const std::string what = target["what"], verdict = target["verdict"];
+      if (target["ratio"].is_null())
+        std::printf("  %-78s %s: %s\n", what.c_str(), verdict.c_str(),
+                    target["why"].get<std::string>().c_str());
+      else
+        std::printf("  %-78s %7.2f x  (%g, aim %g): %s\n", what.c_str(), target["ratio"].get<double>(),
+                    target["at_least"].get<double>(), target["aim"].get<double>(), verdict.c_str());
+    }
+  }
+  void write(const std::filesystem::path& file, const std::string& frames, int repetitions) const {
+    const nlohmann::json result{{"program", "kbvh_broad_phase_bench"},
+                                {"time", now_utc()},
+                                {"commit", commit()},
+                                {"dirty", dirty()},
+                                {"machine", machine()},
+                                {"kernels", name(active_kernel_set())},
+                                {"frames", frames},
+                                {"repetitions", repetitions},
+                                {"clock", "processor time, median of repetitions by turns, one thread"},
+                                {"comparisons", comparisons_},
+                                {"targets", targets_}};
+    std::ofstream out(file);
+    out << result.dump(2) << '\n';
+    if (!out.flush()) throw std::runtime_error("cannot write " + file.string());
+  }
+
+ private:
+  std::map<std::string, double> medians_;
+  nlohmann::json comparisons_ = nlohmann::json::array(), targets_ = nlohmann::json::array();
+};
 
 template <class S>
 struct Mesh {
@@ -330,42 +434,6 @@ void moved(std::uint32_t n, int repetitions, Table& table) {
                 10 * repetitions);
 }
 
-/// The part of a search for edge-edge candidates that the right-most leaves of subtrees save elsewhere: a
-/// tree with itself, each two subtrees once, and the same tree as two, in both orders.
-void both_orders(const FramePair& frames, int repetitions, Table& table) {
-  const Mesh<double> mesh(frames);
-  const Elements elements = make_elements(mesh.v[0].size() / 3, mesh.e, mesh.f);
-  std::vector<double> boxes;
-  for (std::size_t i = 0; i < mesh.v[0].size(); i += 3)
-    for (const bool upper : {false, true}) {
-      for (std::size_t k = i; k < i + 3; ++k)
-        boxes.push_back(upper ? std::max(mesh.v[0][k], mesh.v[1][k]) : std::min(mesh.v[0][k], mesh.v[1][k]));
-      boxes.push_back(0);
-    }
-  ElementTree<double> tree;
-  tree.start(elements.of(Element::edge), 16, active_kernel_set());
-  tree.refresh(boxes.data(), 2);
-  const WideArrays<double> nodes = tree.leaves().tree;
-  std::vector<WidePair> stack(1 << 16);
-  std::vector<LeafSlot> found(1 << 12);
-  const auto traverse = [&](WideOverlapKernels<double>::Traverse kernel) {
-    WideTraversal state{stack.data(),     1, stack.size(),     found.data(), 0,
-                        found.size() / 2, 0, ~std::uint64_t(0)};
-    stack[0] = {0, 0};
-    std::size_t leaf_pairs = 0;
-    for (; state.depth > 0; state.found = 0) {
-      kernel(nodes, nodes, state);
-      leaf_pairs += state.found;
-    }
-    return leaf_pairs;
-  };
-  const auto& kernels = wide_overlap_kernels<double>(active_kernel_set());
-  table.compare("Pairs of leaves of edges whose boxes overlap",
-                {{"each two subtrees once", [&] { return traverse(kernels.self(8)); }},
-                 {"in both orders", [&] { return traverse(kernels.traverse(8)); }}},
-                repetitions);
-}
-
 int run(int argc, char** argv) {
   const std::filesystem::path folder =
       argc > 1 ? std::filesystem::path(argv[1]) : data_folder() / "ccd" / "frames" / "cloth-ball";
@@ -381,12 +449,10 @@ int run(int argc, char** argv) {
     swept(frames, repetitions, table);
     iterates(frames, repetitions, table);
     between_parts(frames, repetitions, table);
-    both_orders(frames, repetitions, table);
   } else {
     std::printf("no pair of frames in %s\n", folder.c_str());
   }
   moved(538, repetitions, table);
-  compare_self_intersections(repetitions, table);
 
   const std::string scratch = "kbvh::broad_phase, double, new object and buffers";
   const std::string known = "kbvh::broad_phase, double, known tree";
@@ -408,8 +474,7 @@ int run(int argc, char** argv) {
                      "a session of a scene starts over to sweep again");
   table.not_measured("swept candidates, over boxes of CGAL and trees of Bullet and Embree",
                      "the adapters of peers have no swept pairs");
-  table.target("a tree with itself, each two subtrees once, over both orders", "each two subtrees once",
-               "in both orders", 0, 0);
+  table.not_measured("exact self pairs, normal cones over none", "there are no cones");
   table.print_targets();
   if (argc > 3) table.write(argv[3], scene, repetitions);
   return 0;
