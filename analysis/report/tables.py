@@ -43,6 +43,7 @@ class Row:
     update: str
     query: str
     total: str
+    p99: str  #: without motion
     ratio: Shown
     ratio_without_motion: Shown
     steady: Shown  #: without motion, of the frames from the second knot on
@@ -86,6 +87,7 @@ COLUMNS = (
     Column("update", "bringing the boxes up to date, plan changes included", lambda row: row.update),
     Column("query", "traversal and triangle tests", lambda row: row.query),
     Column("total", "motion, update and query", lambda row: row.total),
+    Column("p99", "99th percentile of the frames of the repetition with the median total, without motion", lambda row: row.p99),
     Column("ratio", "total time of the best refit over this total; above 1 is faster. In parentheses: 95 % interval; in brackets: range over "
            "fewer than five repetitions", lambda row: row.ratio, compared=True),
     Column("w/o motion", "the same ratio of update and query", lambda row: row.ratio_without_motion, in_page=False),
@@ -198,6 +200,7 @@ def _row(row: object, all_ratios: Ratios) -> Row:
         update=text.milliseconds(row.updating),
         query=text.milliseconds(row.query),
         total=text.milliseconds(row.total_motion),
+        p99=text.milliseconds(row.p99),
         ratio=shown_ratio(with_motion),
         ratio_without_motion=shown_ratio(without),
         steady=shown_ratio(all_ratios.steady.get(run)),

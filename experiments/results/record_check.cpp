@@ -76,6 +76,7 @@ constexpr Field fields[] = {
     {"times.by", Kind::text},
     {"times.disturbed", Kind::text},
     {"times.build_ms", Kind::size},
+    {"times.total_p99", Kind::size, Needed::if_there},
     {"times.repetitions", Kind::list},
     {"times.repetitions[]", Kind::object},
     {"times.repetitions[].motion", Kind::size},

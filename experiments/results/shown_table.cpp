@@ -106,6 +106,7 @@ class Table {
   Rows speeds() const;
   Rows details() const;
   std::optional<RatioOfTimes> ratio(std::size_t i, const char* phase, Part part = Part::clip) const;
+  std::string slow_frame_cell(std::size_t i) const;
   std::string paid_cell(std::size_t i) const;
   std::string ratio_cell(std::size_t i, const char* phase, Part part) const;
   std::string within_cell(std::size_t i, bool beside_intervals) const;
@@ -211,6 +212,11 @@ std::string Table::within_cell(std::size_t i, bool beside_intervals) const {
   return beside_intervals && !found->within->is_interval ? "[" + text + "]" : text;
 }
 
+std::string Table::slow_frame_cell(std::size_t i) const {
+  const json& times = records_[i].at("times");
+  return times.contains("total_p99") ? milliseconds(times.at("total_p99").get<double>()) : "-";
+}
+
 std::string Table::paid_cell(std::size_t i) const {
   if (refit_ == nullptr || &records_[i] == refit_) return "-";
   const json &own = records_[i].at("times"), &other = refit_->at("times");
@@ -269,7 +275,7 @@ Table::Rows Table::details() const {
                                   [](const RawTimes& times) { return times.steady_from.has_value(); });
   Rows rows{{"strategy", "with motion"}};
   if (steady) rows[0].push_back("steady");
-  for (const char* column : {"paid from", "missed", "extra", "protrusion", "looseness", "code"})
+  for (const char* column : {"p99", "paid from", "missed", "extra", "protrusion", "looseness", "code"})
     rows[0].push_back(column);
   for (const std::size_t i : rows_) {
     const json &record = records_[i], &verified = record.at("verified");
@@ -277,6 +283,7 @@ Table::Rows Table::details() const {
     std::vector<std::string> row{label_of(record)};
     row.push_back(timed ? ratio_cell(i, "total_with_motion", Part::clip) : "");
     if (steady) row.push_back(timed ? ratio_cell(i, "total", Part::steady) : "");
+    row.push_back(timed ? slow_frame_cell(i) : "");
     row.push_back(timed ? paid_cell(i) : "");
     row.push_back(std::to_string(verified_count(record, "missed")));
     row.push_back(std::to_string(verified_count(record, "extra")));

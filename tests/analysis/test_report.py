@@ -150,6 +150,14 @@ class TestPage(ReportCase):
         heading = next(line for line in self.run_report("--print")[1].splitlines() if line.startswith("strategy"))
         self.assertEqual(re.split(r"\s{2,}", heading), ["strategy", *(column.name for column in tables.COLUMNS)])
 
+    def test_slow_frames_have_a_column(self) -> None:
+        lines = small()
+        for line in lines:
+            line["times"]["total_p99"] = 7.25
+        page = self.page(lines)
+        self.assertIn(">p99</abbr>", page)
+        self.assertEqual(page.count('<td class="n">7.25</td>'), len(lines))
+
     def test_results_are_never_written(self) -> None:
         synthetic.write(self.folder, small(), '{"schema": 1, "ki')
         before = (self.folder / "results.jsonl").read_bytes()
