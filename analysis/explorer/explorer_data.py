@@ -93,7 +93,7 @@ def data(study: Study, title: str, claims: Optional[paper_claims.Claims], folder
         columns["draws"].append([] if raw is None else _draws(raw))
         again = row["again"]
         columns["limit"].append(again.get("frames_limit", _limit(row)))
-        columns["rounds"].append({key: again[key] for key in ("repetitions", "interval_width", "seconds") if key in again})
+        columns["rounds"].append({key: again[key] for key in ("repetitions", "interval_width", "seconds", "shuffle") if key in again})
         columns["every"].append(number(again.get("oracle_every", row["sampled_every"])))
         columns["pace"].append([[number(p["begin"], 4), number(p["update"], 4), number(p["query"], 4)] for p in row["times_over_time"]])
         columns["quality"].append(

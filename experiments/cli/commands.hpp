@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -37,6 +38,7 @@ struct StudyOptions {
   std::vector<std::string> bodies, strategies, scalars, params, studies, orders, builders;
   std::vector<std::uint64_t> triangles, seeds, l, widths, leaf_sizes;
   std::uint64_t obstacle = 0, keyframes = 0, repetitions = 0, frames_limit = 0, oracle_every = 0;
+  std::optional<std::uint64_t> shuffle;
   double interval_width = -1, seconds = -1;  ///< negative: not given
   bool print_plan = false, list_jobs = false, self = false, continuous = false, names = false;
 };

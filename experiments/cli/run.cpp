@@ -85,6 +85,7 @@ void set_common(json& plan, const StudyOptions& options) {
   if (options.oracle_every > 0) plan["oracle_every"] = options.oracle_every;
   if (options.interval_width >= 0) plan["interval_width"] = options.interval_width;
   if (options.seconds >= 0) plan["seconds"] = options.seconds;
+  if (options.shuffle) plan["shuffle"] = *options.shuffle;
 }
 
 int list_jobs(const Plan& plan) {
@@ -214,6 +215,8 @@ void add_study(CLI::App& command, const std::shared_ptr<StudyOptions>& o) {
              "repeat until the 95 % interval of each ratio is narrower, relative to the ratio (0.05)");
   add_number(command, "--seconds", o->seconds, 0, 1e6,
              "longest time for further rounds of one table after the least number (10); 0: none");
+  add_whole(command, "--shuffle", o->shuffle, ranges::shuffle,
+            "seed of the order of contestants in each round (of each table's name)");
   add_whole(command, "--frames-limit", o->frames_limit, ranges::positive,
             "play only this many first frames (intervals with --continuous)");
   add_whole(command, "--oracle-every", o->oracle_every, ranges::positive,

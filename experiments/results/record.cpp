@@ -88,6 +88,7 @@ json again_record(const json& scene_object, const json& scene, const json& strat
             {"interval_width", study.interval_width},
             {"seconds", study.seconds},
             {"oracle_every", study.oracle_every}};
+  if (study.shuffle) plan["shuffle"] = *study.shuffle;
   if (study.frames_limit > 0) plan["frames_limit"] = study.frames_limit;
   plan.update(asked_of(study.asks));
   return plan;
@@ -115,6 +116,7 @@ std::string configuration_key(const std::string& program, const json& scene, con
             {machine.at("cpu"), machine.at("compiler"), machine.at("flags"), machine.at("build_type"),
              machine.at("kernels")}}};
   all.update(asked_of(study.asks));
+  if (study.shuffle) all["shuffle"] = *study.shuffle;
   if (scene.contains("script")) all["script"] = scene.at("script").at("hash");
   return hexadecimal(hash_of(all.dump()));
 }

@@ -297,7 +297,7 @@ class Runner {
     if (!card_.empty()) about_scene["card"] = card_;
     const std::string scalar = about_scene.at("scalar");
     // Another order for every table, the same whenever it is measured.
-    const std::uint64_t seed = hash_of(title + "/" + scalar) & 0xffffffffu;
+    const std::uint64_t seed = study.shuffle.value_or(hash_of(title + "/" + scalar) & 0xffffffffu);
     std::vector<json> records;           // in the order of the contestants
     std::vector<std::size_t> record_of;  // of each measured contestant
     std::size_t skipped = 0;

@@ -115,6 +115,7 @@ void read_study(JsonReader& keys, Study& study, const std::filesystem::path& fol
   };
   not_negative("interval_width", study.interval_width);
   not_negative("seconds", study.seconds);
+  if (const auto seed = keys.whole("shuffle", ranges::shuffle)) study.shuffle = *seed;
   if (const auto limit = keys.whole("frames_limit", ranges::any)) study.frames_limit = *limit;
   read_question(keys, study.asks);
   if (const auto every = keys.whole("oracle_every", ranges::positive)) study.oracle_every = *every;

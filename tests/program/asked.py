@@ -47,6 +47,7 @@ ASKED: dict[str, dict[str, Any]] = {
     "pairs, more repetitions": {"repetitions": 3},
     "pairs, until intervals are narrower": {"interval_width": 0.01},
     "pairs, with less time for narrow intervals": {"seconds": 0.5},
+    "pairs in another order": {"shuffle": 3},
     "pairs by another tree": {"strategies": [{"id": "bottom_up", "builder": {"width": 4, "leaf_size": 4}}]},
     "pairs with another parameter": {"strategies": [{"id": "bottom_up", "params": {"kernels": "portable"}}]},
     "pairs by another strategy": {"strategies": ["hybrid"]},
@@ -54,7 +55,7 @@ ASKED: dict[str, dict[str, Any]] = {
 }
 #: Options of `kbvh run` that the questions above cover, and others, which choose scenes or do not measure.
 COVERED = {"--continuous", "--changes", "--rays", "--within", "--kernels", "--self", "--order", "--seed", "--strategies", "--param", "--builder",
-           "--width", "--leaf-size", "--l", "--scalar", "--repetitions", "--interval-width", "--seconds", "--frames-limit", "--oracle-every"}  # fmt: skip
+           "--width", "--leaf-size", "--l", "--scalar", "--repetitions", "--interval-width", "--seconds", "--shuffle", "--frames-limit", "--oracle-every"}  # fmt: skip
 OTHERS = {"--help", "--scene", "--body", "--clip", "--name", "--triangles", "--obstacle", "--keyframes", "--script", "--out", "--plan",
           "--study", "--print-plan", "--names", "--list-jobs", "--prepare", "--job"}  # fmt: skip
 

@@ -291,7 +291,7 @@ function runOf(row) {
     repetitions: repetitions.length,
     limit: asked.frames_limit ?? (frames < whole ? frames : 0),
     every: asked.oracle_every ?? verified.sampled_every ?? 1,
-    rounds: Object.fromEntries(["repetitions", "interval_width", "seconds"].filter((key) => key in asked).map((key) => [key, asked[key]])),
+    rounds: Object.fromEntries(["repetitions", "interval_width", "seconds", "shuffle"].filter((key) => key in asked).map((key) => [key, asked[key]])),
     p50: number(record.times?.total_p50),
     p99: number(record.times?.total_p99),
     worst: number(record.times?.total_worst),
