@@ -16,7 +16,7 @@ inline constexpr WholeRange triangles{1, 1u << 27};           ///< of a body
 inline constexpr WholeRange keyframes{2, 1000000};            ///< of a built-in scene
 inline constexpr WholeRange frames_per_keyframe{1, 1000000};  ///< l
 inline constexpr WholeRange repetitions{1, 10000};            ///< timed clips
-inline constexpr WholeRange shuffle{0, 0xffffffffu};            ///< seed of the order of contestants
+inline constexpr WholeRange shuffle{0, 0xffffffffu};          ///< seed of the order of contestants
 inline constexpr WholeRange width{2, 8};                      ///< children of a node: 2, 4 or 8
 inline constexpr WholeRange leaf_size{1, 16};                 ///< maximum number of primitives of a leaf
 }  // namespace ranges

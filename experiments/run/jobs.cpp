@@ -105,11 +105,12 @@ std::vector<Job> jobs_of(const Plan& plan, std::vector<std::string>& notes) {
           job.per_keyframe = l;
           job.configurations = contestants.size();
           job.threads = threads_of(contestants);
-          job.id = id_of(
-              name_of(spec) + "-" + scalar +
-                  (study.asks.continuous ? "-contacts" : "-l" + std::to_string(l)) + job_words(study.asks),
-              {job.scene, scalar, l, study.repetitions, study.interval_width, study.seconds,
-               study.shuffle ? json(*study.shuffle) : json(), study.frames_limit, study.oracle_every, asked_of(study.asks), content_of(contestants)});
+          job.id = id_of(name_of(spec) + "-" + scalar +
+                             (study.asks.continuous ? "-contacts" : "-l" + std::to_string(l)) +
+                             job_words(study.asks),
+                         {job.scene, scalar, l, study.repetitions, study.interval_width, study.seconds,
+                          study.shuffle ? json(*study.shuffle) : json(), study.frames_limit,
+                          study.oracle_every, asked_of(study.asks), content_of(contestants)});
           if (known.insert(job.id).second) jobs.push_back(std::move(job));
         }
     }

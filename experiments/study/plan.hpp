@@ -22,13 +22,13 @@ struct Study {
   BuilderRequest builder;                       ///< for all strategies without their own builder
   std::vector<std::uint32_t> per_keyframe{10};  ///< l: frames for each keyframe interval
   std::vector<std::string> scalars{"float"};
-  std::uint32_t repetitions = 5;   ///< at least; fewer than five: exactly this many, and no interval
-  double interval_width = 0.05;    ///< repeat until each ratio's relative interval is narrower
-  double seconds = 10;             ///< rounds beyond the least number end after this time
+  std::uint32_t repetitions = 5;         ///< at least; fewer than five: exactly this many, and no interval
+  double interval_width = 0.05;          ///< repeat until each ratio's relative interval is narrower
+  double seconds = 10;                   ///< rounds beyond the least number end after this time
   std::optional<std::uint64_t> shuffle;  ///< seed of the order of contestants; without: of the table's name
-  std::uint64_t frames_limit = 0;  ///< only this many first frames; 0: all
-  std::uint64_t oracle_every = 1;  ///< verify every n-th frame (and the last)
-  Question asks;                   ///< of every contestant at every frame
+  std::uint64_t frames_limit = 0;        ///< only this many first frames; 0: all
+  std::uint64_t oracle_every = 1;        ///< verify every n-th frame (and the last)
+  Question asks;                         ///< of every contestant at every frame
 };
 
 /// A plan: one or more studies, run one after the other into the same results.

@@ -163,12 +163,13 @@ TEST(Plan, WhatIsGivenTwiceIsMeasuredOnce) {
 }
 
 TEST(Plan, ErrorsNameFileKeyAndValue) {
-  EXPECT_EQ(plan_complaint(R"({"scenes": "tablecloth", "repetition": 3})"),
-            "p.json: there is no key 'repetition'; known are builder, changes, continuous, description, "
-            "frames_limit, interval_width, kernels, l, name, "
-            "oracle_every, params, rays, repetitions, scalars, scenes, seconds, shuffle, strategies, studies, "
-            "targets, within; did you mean "
-            "'repetitions'?");
+  EXPECT_EQ(
+      plan_complaint(R"({"scenes": "tablecloth", "repetition": 3})"),
+      "p.json: there is no key 'repetition'; known are builder, changes, continuous, description, "
+      "frames_limit, interval_width, kernels, l, name, "
+      "oracle_every, params, rays, repetitions, scalars, scenes, seconds, shuffle, strategies, studies, "
+      "targets, within; did you mean "
+      "'repetitions'?");
   EXPECT_TRUE(contains(plan_complaint("{\n  \"scenes\": ]\n}"), "p.json: line 2, column 13"));
   EXPECT_TRUE(contains(plan_complaint("[]"), "p.json: expected an object"));
   EXPECT_TRUE(contains(plan_complaint("{}"), "p.json: scenes: is missing"));
