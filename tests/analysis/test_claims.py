@@ -94,6 +94,14 @@ def counts(where: Where, counter: str, factor: Callable[[Line], float]) -> Calla
     return change
 
 
+def loosened(where: Where) -> Callable[[list[Line]], None]:
+    def change(lines: list[Line]) -> None:
+        for one in filter(where, lines):
+            one["verified"]["looseness"] = 0.5
+
+    return change
+
+
 def both(*changes: Callable[[list[Line]], None]) -> Callable[[list[Line]], None]:
     def change(lines: list[Line]) -> None:
         for one in changes:
@@ -124,6 +132,7 @@ CONTRADICTIONS: dict[str, Callable[[list[Line]], None]] = {
     "E14": times(of("rebuild"), "update", lambda _: 0.01),
     "E15": both(times(of("bottom_up"), "update", lambda one: 1 / l_of(one)),
                 times(of("bottom_up_period"), "update", lambda one: 1 / l_of(one))),
+    "E16": loosened(of("kinetic_aabb", "tablecloth")),
 }  # fmt: skip
 
 
