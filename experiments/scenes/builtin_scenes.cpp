@@ -8,6 +8,7 @@
 #include "experiments/common/text.hpp"
 #include "experiments/io/animated_mesh_cache.hpp"
 #include "experiments/scenes/ageing.hpp"
+#include "experiments/scenes/curtain.hpp"
 #include "experiments/scenes/curves.hpp"
 #include "experiments/scenes/garment.hpp"
 #include "experiments/scenes/modal.hpp"
@@ -224,6 +225,11 @@ Meshes thrown(const BuiltinOptions& options, const MakeProgress&) {
           scenes::icosphere(obstacle_triangles(options), {0.1, -0.05, 3.2}, 0.5)};
 }
 
+Meshes swept_curtain(const BuiltinOptions& options, const MakeProgress&) {
+  return {scenes::swept_curtain(options.triangles, options.seed, options.keyframes),
+          scenes::sweeping_box(obstacle_triangles(options), options.keyframes)};
+}
+
 Meshes funnel_cloth(const BuiltinOptions& options, const MakeProgress&) {
   return {scenes::funnel_cloth(ageing(options)), scenes::funnel(obstacle_triangles(options))};
 }
@@ -266,6 +272,7 @@ const std::vector<BuiltinScene>& builtin_scenes() {
       {"hidden_crowd", "108 balls spin behind three walls, and some before them: what a camera does not see",
        &hidden_crowd},
       {"funnel_cloth", "a cloth is pulled through a funnel and gathers into pleats", &funnel_cloth},
+      {"swept_curtain", "a hanging curtain is swept by a box that moves along it", &swept_curtain},
       {"running_figures", "two people run on the spot, 25 keyframes per second: steps as large as triangles",
        &two_alike<scenes::running_figures>},
       {"morphing_ball", "a ball morphs between four shapes and cuts a sphere at rest: three modes",
