@@ -138,7 +138,7 @@ def write(
         size=text.size,
         sections=sections.sections(study, groups, all_looks, folder / "figures", which),
         most=tables.MOST,
-        columns=[column for column in tables.COLUMNS if column.in_page],
+        table_columns=[column for column in tables.COLUMNS if column.in_page],
         remarks=tables.remarks(study),
         ageing_scenes=ageing.scenes(study),
         choices=choices.choices(study),

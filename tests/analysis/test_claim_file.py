@@ -102,6 +102,20 @@ class TestForm(unittest.TestCase):
         said["claims"][0]["checks"].pop()
         self.assertEqual(check(said), "f: T1: id: there are two claims of this name")
 
+    def test_the_papers_plan_measures_every_claim(self) -> None:
+        plan = json.loads((paths.HERE.parents[1] / "experiments" / "plans" / "paper.json").read_text(encoding="utf-8"))
+        studies = [plan, *plan["studies"]]
+        scenes = [scene if isinstance(scene, dict) else {"builtin": scene} for study in studies for scene in study.get("scenes", [])]
+        scene_names = {scene.get("name") or scene.get("builtin") for scene in scenes}
+        ids = {one if isinstance(one, str) else one["id"] for study in studies for one in study.get("strategies", [])}
+        for claim in self.said["claims"]:
+            for one in claim["checks"]:
+                self.assertLessEqual({*one["scenes"], *one.get("optional_scenes", [])}, scene_names, claim["id"])
+                for corner in self.said["squares"][one["square"]] if "square" in one else [one]:
+                    for term in (corner[side] for side in claim_file.SIDES if side in corner):
+                        named = {term["strategy"]} if isinstance(term, dict) and "strategy" in term else set()
+                        self.assertLessEqual(named, ids, claim["id"])
+
     def test_every_key_is_documented(self) -> None:
         text = (paths.HERE.parents[1] / "experiments" / "RESULTS.md").read_text(encoding="utf-8")
         section = text[text.index("\n## Claims\n") : text.index("\n## Folders\n")]
