@@ -87,6 +87,28 @@ void for_all_pairs(const Elements& elements, CandidateKind kind, const Take& tak
         take(Candidate{a, b});
 }
 
+/// Finds the first contact of a vertex and a face, or of two edges, of a mesh in motion by itself.
+template <class S>
+Impact impact_of(const Mesh<S>& mesh, const Elements& elements, CandidateKind kind, const Candidate& pair) {
+  const bool edges = kind == CandidateKind::edge_edge;
+  const auto first = elements.vertices(first_element(kind), pair.first);
+  const auto second = elements.vertices(second_element(kind), pair.second);
+  std::vector<std::uint32_t> vertices;
+  for (const auto& part : edges ? std::array{first, second} : std::array{second, first})
+    vertices.insert(vertices.end(), part.begin(), part.end());
+  double numbers[2][4][3];
+  MovingPoints points{};
+  for (std::size_t i = 0; i < 4; ++i) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      numbers[0][i][k] = double(mesh.v0[3 * vertices[i] + k]);
+      numbers[1][i][k] = double(mesh.v1[3 * vertices[i] + k]);
+    }
+    points.begin[i] = numbers[0][i];
+    points.end[i] = numbers[1][i];
+  }
+  return find_impact(edges ? Contact::Kind::edge_edge : Contact::Kind::vertex_face, points);
+}
+
 /// Finds candidates, given the boxes of vertices.
 template <class S>
 Pairs brute_force(const Elements& elements, CandidateKind kind, const std::vector<Box<S>>& boxes) {

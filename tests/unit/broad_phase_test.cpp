@@ -265,26 +265,7 @@ TYPED_TEST(BroadPhases, TheEarliestImpactIsThatOfAllPairs) {
     double end = 2;
     for (const CandidateKind kind : {CandidateKind::face_vertex, CandidateKind::edge_edge})
       for_all_pairs(elements, kind, [&](const Candidate& pair) {
-        std::vector<std::uint32_t> vertices;
-        const auto add = [&](Element element, std::uint32_t id) {
-          const auto of = elements.vertices(element, id);
-          vertices.insert(vertices.end(), of.begin(), of.end());
-        };
-        const bool edges = kind == CandidateKind::edge_edge;
-        edges ? add(Element::edge, pair.first) : add(Element::vertex, pair.second);
-        edges ? add(Element::edge, pair.second) : add(Element::face, pair.first);
-        double numbers[2][4][3];
-        MovingPoints points{};
-        for (std::size_t i = 0; i < 4; ++i) {
-          for (std::size_t k = 0; k < 3; ++k) {
-            numbers[0][i][k] = double(mesh.v0[3 * vertices[i] + k]);
-            numbers[1][i][k] = double(mesh.v1[3 * vertices[i] + k]);
-          }
-          points.begin[i] = numbers[0][i];
-          points.end[i] = numbers[1][i];
-        }
-        const Impact impact =
-            find_impact(edges ? Contact::Kind::edge_edge : Contact::Kind::vertex_face, points);
+        const Impact impact = impact_of(mesh, elements, kind, pair);
         if (impact.touches) end = std::min(end, impact.end);
       });
     EarliestImpactStats stats;

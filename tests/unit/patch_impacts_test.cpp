@@ -11,25 +11,8 @@ namespace {
 template <class S, class Take>
 void for_all_impacts(const Mesh<S>& mesh, const Elements& elements, const Take& take) {
   for (const CandidateKind kind : {CandidateKind::face_vertex, CandidateKind::edge_edge}) {
-    const bool edges = kind == CandidateKind::edge_edge;
-    for_all_pairs(elements, kind, [&](const Candidate& pair) {
-      const auto first = elements.vertices(first_element(kind), pair.first);
-      const auto second = elements.vertices(second_element(kind), pair.second);
-      std::vector<std::uint32_t> vertices;
-      for (const auto& part : edges ? std::array{first, second} : std::array{second, first})
-        vertices.insert(vertices.end(), part.begin(), part.end());
-      double numbers[2][4][3];
-      MovingPoints points{};
-      for (std::size_t i = 0; i < 4; ++i) {
-        for (std::size_t k = 0; k < 3; ++k) {
-          numbers[0][i][k] = double(mesh.v0[3 * vertices[i] + k]);
-          numbers[1][i][k] = double(mesh.v1[3 * vertices[i] + k]);
-        }
-        points.begin[i] = numbers[0][i];
-        points.end[i] = numbers[1][i];
-      }
-      take(kind, pair, find_impact(edges ? Contact::Kind::edge_edge : Contact::Kind::vertex_face, points));
-    });
+    for_all_pairs(elements, kind,
+                  [&](const Candidate& pair) { take(kind, pair, impact_of(mesh, elements, kind, pair)); });
   }
 }
 
