@@ -139,7 +139,8 @@ void InProgress::read(const std::filesystem::path& file) {
   Earlier::Cause cause = Earlier::Cause::fault;
   std::string all;
   try {
-    all = io::read_file(file);
+    // A run that was killed between two works has left an empty file.
+    if (std::error_code error; std::filesystem::file_size(file, error) > 0) all = io::read_file(file);
   } catch (const io::InputError&) {
     return;
   }

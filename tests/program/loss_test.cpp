@@ -110,6 +110,18 @@ TEST_F(Binary, AContestantThatAbortsIsReportedAndLeftOut) {
   EXPECT_NE(alone.err.find("while verifying aborts on waving_sheet"), std::string::npos) << alone.err;
 }
 
+TEST_F(Binary, AnEmptyNoteOfAKilledRunIsRemoved) {
+  std::filesystem::create_directories(folder_ / "out");
+  char host[256] = {};
+  ASSERT_EQ(::gethostname(host, sizeof host - 1), 0);
+  // No process has this number: a run that was killed before it began to measure has left this file.
+  const std::filesystem::path left = folder_ / "out" / (std::string(host) + "-2147483647.measuring");
+  std::ofstream(left).close();
+  const Outcome run = kbvh("run " + tiny + "--strategies bottom_up --out out");
+  EXPECT_EQ(run.code, 0) << run.err;
+  EXPECT_FALSE(std::filesystem::exists(left));
+}
+
 // Lack of memory is the usual reason: no verdict, and the next run measures the others of the table.
 TEST_F(Binary, AContestantThatTerminatesTheProgramIsTriedOnceMoreAfterTheOthers) {
   const std::string arguments = "run " + tiny + "--strategies honest,needs_memory --out out";
