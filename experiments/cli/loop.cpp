@@ -169,7 +169,7 @@ void add_loop(CLI::App& program, Action& action) {
       add_whole(*command, "--seed", options.seed, ranges::any, "of the scene's random numbers (1)"),
       add_whole(*command, "--steps", options.steps, {1, 100000000},
                 "of 0.01 s, those of an earlier run included (200)"),
-      add_text(*command, "--detect", a->detect, "anew, refit or kept (refit)"),
+      add_text(*command, "--detect", a->detect, "rebuild, refit or kept (refit)"),
       add_number(*command, "--keep", a->keep, 1e-3, 1e3,
                  "with kept: how far vertices move until candidates are found again, in radii (1)"),
       add_whole(*command, "--save-every", options.save_every, {1, 1000000},

@@ -29,7 +29,7 @@ TEST_F(Binary, LoopRunsRecordsAndReplays) {
 
   const Outcome play = kbvh("loop --play out/loop.recording --truth-every 5");
   EXPECT_EQ(play.code, 0) << play.err;
-  for (const char* word : {"near", "swept", "impact", "anew", "kept, 0.5 radii"})
+  for (const char* word : {"near", "swept", "impact", "rebuild", "kept, 0.5 radii"})
     EXPECT_NE(play.out.find(word), std::string::npos) << word << "\n" << play.out;
   for (const std::string& out : {run.out, play.out}) {
     std::size_t longest = 0, begin = 0;
