@@ -46,6 +46,11 @@ std::string changes_per_frame(const json& record) {
   return frames > 0 ? fmt::format("{:.4g}", sum / frames) : "-";
 }
 
+/// Returns whether the scene was asked from outside: for rays, or near points.
+bool asks_probes(const json& scene) {
+  return scene.contains("rays") || scene.contains("within");
+}
+
 /// Returns ", 35 true pairs in 4 compared frames": what the answers of a table were held against. Empty for
 /// records that do not say it.
 std::string truth_of(const std::vector<json>& records, const json& scene, const std::string& step) {
@@ -61,8 +66,7 @@ std::string truth_of(const std::vector<json>& records, const json& scene, const 
     found = whole("pairs");
   }
   if (most == 0) return {};
-  const bool of_probes = scene.contains("rays") || scene.contains("within");
-  const char* const noun = of_probes                          ? "true hit"
+  const char* const noun = asks_probes(scene)                 ? "true hit"
                            : scene.value("continuous", false) ? "true contact"
                                                               : "true pair";
   return ", " + counted(found, noun) + " in " + counted(most, "compared " + step);
@@ -307,7 +311,10 @@ void Table::notes() {
     std::string peer = strategy.value("version", "");
     if (peer.empty()) continue;
     peer = strategy.at("id").get<std::string>() + " is " + peer;
-    if (const std::string remark = strategy.value("remark", ""); !remark.empty()) peer += ": " + remark;
+    // Remarks are about pairs.
+    if (const std::string remark = strategy.value("remark", "");
+        !remark.empty() && !asks_probes(records_[i].at("scene")))
+      peer += ": " + remark;
     if (std::find(said.begin(), said.end(), peer) != said.end()) continue;
     said.push_back(peer);
     note(peer);
