@@ -150,7 +150,7 @@ int play_recording(const LoopArguments& arguments) {
 int write_clip(const LoopArguments& arguments) {
   const std::uint64_t count =
       loop::save_iterates(arguments.recording, arguments.clip, arguments.playing.most_iterates);
-  print(counted(count, "iterate") + " written. To play them with any strategy:\n  kbvh run --body file=" +
+  print(counted(count, "iterate") + " written. To play them with any strategy:\n  kbvh run --body " +
         arguments.clip + "/iterates.obj,motion=" + arguments.clip + "/iterates.pc2 --self --l 1\n");
   return success;
 }

@@ -36,7 +36,7 @@ TEST_F(Binary, LoopRunsRecordsAndReplays) {
   EXPECT_EQ(clip.code, 0) << clip.err;
   EXPECT_NE(clip.out.find("9 iterates"), std::string::npos) << clip.out;
   const Outcome compared = kbvh(
-      "run --body file=iterates/iterates.obj,motion=iterates/iterates.pc2 --self --l 1 --repetitions 1 "
+      "run --body iterates/iterates.obj,motion=iterates/iterates.pc2 --self --l 1 --repetitions 1 "
       "--strategies bottom_up,front --out clip");
   EXPECT_EQ(compared.code, 0) << compared.err;
   const std::vector<json> contestants = records("clip/results.jsonl");
