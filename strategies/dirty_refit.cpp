@@ -46,7 +46,7 @@ class DirtyRefit final : public StoredHierarchyStrategy<S>,
   }
 
  private:
-  void take_moved(std::uint32_t body, std::span<const std::uint32_t> vertices) override {
+  void take_moved(std::uint32_t body, std::optional<std::span<const std::uint32_t>> vertices) override {
     moved_.tell(body, vertices);
   }
   void follow_plans(double t, std::span<const PlanChange<S>> changes) override {

@@ -79,21 +79,25 @@ void MovedVertices<S>::end_frame() {
 }
 
 template <class S>
-void MovedVertices<S>::tell(std::uint32_t body, std::span<const std::uint32_t> vertices) {
+void MovedVertices<S>::tell(std::uint32_t body, std::optional<std::span<const std::uint32_t>> vertices) {
   if (body >= bodies_.size())
     throw std::invalid_argument("moved vertices of body " + std::to_string(body) + " of " +
                                 std::to_string(bodies_.size()));
+  if (!vertices) {
+    if (bodies_[body].told) forget(body);
+    return;
+  }
   const std::uint32_t count = vertex_count(body);
-  for (const std::uint32_t vertex : vertices)
+  for (const std::uint32_t vertex : *vertices)
     if (vertex >= count)
       throw std::invalid_argument("vertex " + std::to_string(vertex) + " moved, but body " +
                                   std::to_string(body) + " has " + std::to_string(count) + " vertices");
   Body& known = bodies_[body];
   known.told = true;
   known.end = -std::numeric_limits<double>::infinity();
-  known.too_many = vertices.size() > most(count);
+  known.too_many = vertices->size() > most(count);
   known.vertices.clear();
-  if (!known.too_many) known.vertices.assign(vertices.begin(), vertices.end());
+  if (!known.too_many) known.vertices.assign(vertices->begin(), vertices->end());
 }
 
 template <class S>
