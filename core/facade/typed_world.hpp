@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
+#include "core/contract/takes_moved_vertices.hpp"
 #include "core/facade/conversions.hpp"
 #include "core/motion/admissible.hpp"
 #include "core/scene/cut_polygons.hpp"

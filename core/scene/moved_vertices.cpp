@@ -7,7 +7,8 @@
 namespace kbvh {
 namespace {
 
-/// The motion of a body's keyframed vertices on the segment that begins at or before t; empty where they rest.
+/// The motion of a body's keyframed vertices on the segment that begins at or before t; empty where they
+/// rest.
 template <class S>
 class SegmentMoves {
  public:
@@ -152,8 +153,9 @@ void MovedVertices<S>::add_moving(Body& body, const FlightPlans<S>& plans, doubl
     }
   }
   for (std::uint32_t v = 0; v < plans.vertex_count(); ++v) {
-    const bool moves = v >= keyframed || (own && plans.has_own_plan(v)) ? moves_by_itself(plans, v, t)
-                                                                        : !segment.empty() && segment.moves(v);
+    const bool moves = v >= keyframed || (own && plans.has_own_plan(v))
+                           ? moves_by_itself(plans, v, t)
+                           : !segment.empty() && segment.moves(v);
     if (moves && !add(body, v, room)) return;
   }
 }

@@ -39,9 +39,7 @@ class MovedVertices : private SampledMotion<S> {
   void start_over();
 
   /// Returns the number of vertices, including those added at run time.
-  std::uint32_t vertex_count(std::uint32_t body) const {
-    return this->playback_->plans(body).vertex_count();
-  }
+  std::uint32_t vertex_count(std::uint32_t body) const { return this->playback_->plans(body).vertex_count(); }
   std::size_t bytes() const;
 
  private:

@@ -1,8 +1,8 @@
 // The time of kbvh::broad_phase relative to other ways to the same pairs, in one run and by turns: swept
-// vertex-face and edge-edge candidates between two frames, from scratch and with a known tree; iterates within
-// a bound; updates of few vertices; candidates between groups; self intersections of cloth with cones and
-// without. Prints medians of processor time in ms and ratios, and compares them with targets; FILE receives
-// all times, ratios and targets, for analysis/broad_phase_targets.py.
+// vertex-face and edge-edge candidates between two frames, from scratch and with a known tree; iterates
+// within a bound; updates of few vertices; candidates between groups; self intersections of cloth with cones
+// and without. Prints medians of processor time in ms and ratios, and compares them with targets; FILE
+// receives all times, ratios and targets, for analysis/broad_phase_targets.py.
 //   kbvh_broad_phase_bench [FRAMES] [REPETITIONS] [FILE]
 // FRAMES is a folder with a pair of frames (default: cloth-ball of the data folder); without it, rows that
 // need one are left out.
@@ -94,7 +94,8 @@ void swept_by_trees(const FramePair& frames, int repetitions, Table& table) {
                            return out.size();
                          }});
   std::list<PeerBoxes<float>> peers;
-  for (const auto& [id, name] : {std::pair("bullet_dbvt", "Bullet's dynamic tree"), {"embree_refit", "Embree"}}) {
+  for (const auto& [id, name] :
+       {std::pair("bullet_dbvt", "Bullet's dynamic tree"), {"embree_refit", "Embree"}}) {
     const StrategyEntry* const entry = known_strategy(id);
     if (entry == nullptr) continue;
     PeerBoxes<float>& peer = peers.emplace_back(frames, *entry, std::vector<BodyPair>{{0, 1}});

@@ -108,7 +108,8 @@ class ElementScene {
   ElementScene(const FramePair& frames, Motion motion) : frames_(frames) {
     std::vector<std::array<std::uint32_t, 1>> vertices;
     for (std::uint32_t v = 0; v < frames.positions[0].size() / 3; ++v) vertices.push_back({v});
-    for (const auto& positions : frames.positions) positions_.insert(positions_.end(), positions.begin(), positions.end());
+    for (const auto& positions : frames.positions)
+      positions_.insert(positions_.end(), positions.begin(), positions.end());
     add("vertices", vertices, motion);
     add("faces", frames.faces, motion);
     add("edges", frames.edges, motion);
@@ -127,7 +128,8 @@ class ElementScene {
         apart += a[0] != b[0] && a[0] != b[1] && a[1] != b[0] && a[1] != b[1] ? 1 : 0;
       } else {
         const auto& face = frames_.faces[pair.primitive_b];
-        apart += face[0] != pair.primitive_a && face[1] != pair.primitive_a && face[2] != pair.primitive_a ? 1 : 0;
+        apart +=
+            face[0] != pair.primitive_a && face[1] != pair.primitive_a && face[2] != pair.primitive_a ? 1 : 0;
       }
     }
     return apart;
@@ -199,7 +201,8 @@ class PeerBoxes {
   PeerBoxes(const FramePair& frames, const StrategyEntry& entry, std::vector<BodyPair> pairs)
       : elements_(frames, ElementScene<S>::Motion::boxes) {
     elements_.scene().pairs = std::move(pairs);
-    session_.emplace(elements_.scene(), kbvh::Contestant{&entry, {}, entry.info.topology.preferred}, Use::timed);
+    session_.emplace(elements_.scene(), kbvh::Contestant{&entry, {}, entry.info.topology.preferred},
+                     Use::timed);
     for (std::uint32_t body = 0; body < 3; ++body) session_->hand_in(body, elements_.positions());
     session_->reset(0);
   }

@@ -83,8 +83,8 @@ using StaleList = Dirty<S, Fault::stale_list>;
 template <class S>
 TestScene<S> test_scene(std::uint32_t l) {
   TestScene<S> test;
-  test.scene.bodies.push_back(placed_grid<S>(
-      10, 5, [](std::uint32_t k, std::uint32_t i, std::uint32_t j, int axis) -> double {
+  test.scene.bodies.push_back(
+      placed_grid<S>(10, 5, [](std::uint32_t k, std::uint32_t i, std::uint32_t j, int axis) -> double {
         double height = 0.02;
         for (std::uint32_t past = 1; past <= k; ++past) height += (i + 3 * j) % 17 == past ? -0.05 : 0;
         return axis == 0 ? i / 10.0 : axis == 1 ? j / 10.0 : height;

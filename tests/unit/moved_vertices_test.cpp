@@ -142,7 +142,7 @@ Scene<S> patch(std::uint32_t n, std::uint32_t side) {
   Scene<S> scene;
   scene.bodies.push_back(
       placed_grid<S>(n, 4, [&](std::uint32_t k, std::uint32_t i, std::uint32_t j, int axis) -> double {
-        return axis == 0 ? double(i) / n
+        return axis == 0   ? double(i) / n
                : axis == 1 ? double(j) / n
                            : (i < side && j < side && k % 2 == 1 ? 0.1 + 0.01 * i : 0);
       }));
@@ -243,7 +243,7 @@ TEST(DirtyRefit, FollowsPlansThatChange) {
     whole.session.change_plans(changes, whole.times);
   };
   EXPECT_EQ(both(4), nodes_to_refit(dirty.session.strategy().audit_view(0)->topology,
-                                        scene.bodies[0].primitives, patch_vertices(n, 4)));
+                                    scene.bodies[0].primitives, patch_vertices(n, 4)));
   EXPECT_EQ(both(4.5), 0u);
   change(77, 0.5F);
   const std::uint64_t one = nodes_to_refit(topology, scene.bodies[1].primitives, {77});

@@ -418,8 +418,7 @@ void bind_world(py::module_& module) {
       .def("reset", method(&PythonWorld::reset), arg("t"))
       .def("advance", method(&PythonWorld::advance), arg("t"))
       .def("next_knot", method(&PythonWorld::next_knot))
-      .def("set_positions", method(&PythonWorld::set_positions), arg("body"), arg("positions"),
-           arg("moved"))
+      .def("set_positions", method(&PythonWorld::set_positions), arg("body"), arg("positions"), arg("moved"))
       .def("change_plans", method(&PythonWorld::change_plans), arg("body"), arg("vertices"),
            arg("velocities"), arg("times"), arg("positions"))
       .def("change_geometry", method(&PythonWorld::change_geometry), arg("vertices"), arg("primitives"),

@@ -11,9 +11,9 @@
 
 namespace kbvh {
 
-/// Finds the nodes of a wide hierarchy that have to be refitted when only some vertices have moved: those with
-/// a leaf at such a vertex, and all above. For layouts that were never edited: children have larger numbers
-/// than their parents.
+/// Finds the nodes of a wide hierarchy that have to be refitted when only some vertices have moved: those
+/// with a leaf at such a vertex, and all above. For layouts that were never edited: children have larger
+/// numbers than their parents.
 template <class S>
 class DirtyNodes {
  public:
