@@ -286,9 +286,9 @@ class IntervalJoinStrategy final : public CountedStrategy<S>,
     if (repairs.kept + repairs.restarted == 0) return;
     table.add("segments_kept", repairs.kept);
     table.add("segments_restarted", repairs.restarted);
-    table.add("leaves_made_anew", repairs.leaves);
+    table.add("leaves_remade", repairs.leaves);
     table.add("pairs_removed", pairs_removed_);
-    table.add("pairs_joined_anew", pairs_added_);
+    table.add("pairs_added", pairs_added_);
   }
 
  private:

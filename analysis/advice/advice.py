@@ -23,6 +23,7 @@ import pandas as pd
 from ratios import profiles, ratios
 from results import clip_times, text
 from results.load import Study
+from results.scene_names import words
 
 #: What a strategy may know about motion, from least to most.
 FORESIGHT: dict[str, tuple[str, ...]] = {
@@ -138,7 +139,8 @@ class Advice:
             return f"a refit, {span} times as fast as the best one of the {'cell' if self.cells == 1 else 'cells'}{missing}{disturbed}"
         if self.baseline:
             where = "in the only cell" if self.cells == 1 else f"in {self.best_in} of {text.plural(self.cells, 'cell')}"
-            worst = f"; at worst {text.factor(self.low)} times as fast as that one" if self.best_in < self.cells else ""
+            behind = "less than 1\u00a0% slower" if text.factor(self.low) == "1.00" else f"at worst {text.factor(self.low)} times as fast"
+            worst = f"; elsewhere {behind}" if self.best_in < self.cells else ""
             return f"the best refit {where}{worst}{missing}{disturbed}"
         span = f"{text.factor(self.low)} to {text.factor(self.high)}" if self.low < self.high else ""
         of = f"{span} in {text.plural(self.cells, 'cell')}".lstrip()
@@ -290,7 +292,7 @@ def geometric_mean(values: Sequence[float]) -> float:
 
 def _title(row: pd.Series) -> str:
     scalar = "" if row["scalar"] == "float" else f", {row['scalar']}"
-    return f"{row['scene_name']}, {text.size(row['primitives'])}, l = {row['l']:g}{scalar}"
+    return f"{words(row['scene_name'])}, {text.size(row['primitives'])}, l = {row['l']:g}{scalar}"
 
 
 def sentence(one: Situation) -> str:

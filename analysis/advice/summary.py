@@ -17,6 +17,7 @@ from figures import time_error_file, time_error_panels
 from ratios import ratios
 from results import text
 from results.load import OLD_SCHEMA, Study
+from results.scene_names import words
 
 REFERENCE = Path(__file__).resolve().parents[1] / "reference"
 #: The claim that the paper's abstract makes: kinetic trees are updated faster than by a refit.
@@ -135,7 +136,7 @@ def on_disturbance(study: Study) -> str:
     share = len(doubtful) / len(rest)
     return (
         f"The machine was {'often ' if share > 0.1 else ''}disturbed: {len(doubtful)} of {of} are doubtful and have a question mark, for example "
-        f"{example['title']} on {example['scene']} ({example['disturbed']})."
+        f"{example['title']} on {words(example['scene'])} ({example['disturbed']})."
     )
 
 
@@ -289,7 +290,7 @@ def lines(study: Study, every: Sequence[MeasuredCell]) -> list[Line]:
         scalar = "" if row["scalar"] == "float" else f", {row['scalar']}"
         found.append(
             Line(
-                str(row["scene"]) + scalar, "" if cell.asks == advice.PAIRS else cell.asks, text.size(row["primitives"]), f"{row['l']:g}",
+                words(str(row["scene"])) + scalar, "" if cell.asks == advice.PAIRS else cell.asks, text.size(row["primitives"]), f"{row['l']:g}",
                 str(row["group"]), by_knowledge,
             )  # fmt: skip
         )

@@ -6,6 +6,7 @@ import pandas as pd
 
 from results import text
 from results.load import READ_COUNTERS, Study
+from results.scene_names import words
 
 NOISY = 0.1  #: spread of repetitions from which a run is called noisy
 
@@ -31,7 +32,7 @@ def _noise(timed: pd.DataFrame) -> tuple[str, str]:
         noisy = int((several["spread"] > NOISY).sum())
         words.append(
             f"Repetitions of one run differ by {text.percent(spread)} (median of largest minus smallest total) and by up to "
-            f"{text.percent(worst['spread'])} ({worst['label']}, {worst['scene']}, l = {worst['l']:g}); smaller differences "
+            f"{text.percent(worst['spread'])} ({worst['label']}, {words(worst['scene'])}, l = {worst['l']:g}); smaller differences "
             "are not findings."
         )
         if noisy:

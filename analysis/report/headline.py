@@ -188,7 +188,10 @@ def strategies(all_cases: list[Case], rows: list[Contestant]) -> str:
         other = case.run(who, who.update_of) if who.update_of else None
         if other is not None:
             updating, mark = other["updating"], f" {PEER}"
-            remarks.append(f"{PEER} {run['title']}, {run['version'] or 'of unknown version'}: {run['remark']}.")
+            whole = text.factor(best["total_motion"] / (updating + run["query"] + run["motion"]))
+            remarks.append(
+                f"{PEER} {run['title']}, {run['version'] or 'of unknown version'}: {run['remark']}. With the update shown, a clip would be {whole}x."
+            )
         version = f" ({run['version']})" if run["version"] and other is None else ""
         tuned = f" {TUNED}" if who.id == "auto" and case.scene in tuned_scenes() else ""
         cells = [who.words + version + mark + tuned, text.milliseconds(updating), text.milliseconds(run["query"]),

@@ -25,6 +25,11 @@ def family(name: str, bodies: Any) -> str:
     return "-".join([head, *(part for part in rest if part not in counts)]) + answer
 
 
+def words(name: str) -> str:
+    """Writes the id of a built-in scene as words for a reader: "waving_sheet-800" is "waving sheet-800". Other names stay."""
+    return name.replace("_", " ") if re.fullmatch(r"[a-z]+(_[a-z]+)+(-\d+)*", ANSWER.sub("", name)) else name
+
+
 def told_apart(runs: pd.DataFrame) -> tuple[pd.Series, list[str]]:
     """Returns the scene of each run, and a sentence for every name that several scenes share.
 

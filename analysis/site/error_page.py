@@ -41,7 +41,7 @@ def page(results: Path) -> str:
         "turns, and every answer is compared with the exact one.",
         "",
         f"The figures are drawn from `{file.name}` in `{results.name}`. `kbvh run --plan experiments/plans/error.json --out results/error` measures "
-        "anew, and `analysis/errors.py results/error --write FILE` makes the file.",
+        "again, and `analysis/errors.py results/error --write FILE` makes the file.",
         "",
     ]
     macros = environment().get_template("error_figure.html.j2").module

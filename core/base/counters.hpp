@@ -19,7 +19,7 @@ namespace kbvh {
   X(certificates_discarded, "scheduled failures removed before they happened")                       \
   X(internal_events, "events that changed no bound")                                                 \
   X(overlap_events, "boxes of a separation list that began to overlap")                              \
-  X(fathers_apart_events, "inner pairs above a separation list whose boxes ceased to overlap")       \
+  X(parents_apart_events, "inner pairs above a separation list whose boxes ceased to overlap")       \
   X(leaves_apart_events, "overlapping pairs of leaves that ceased to overlap")                       \
   X(bound_change_events, "changes of a box that occurs in a separation list")                        \
   X(list_peak, "largest number of pairs in the separation list (a maximum, not a sum)")              \

@@ -12,6 +12,7 @@
 #include "experiments/common/progress.hpp"
 #include "experiments/common/text.hpp"
 #include "experiments/io/bytes.hpp"
+#include "experiments/loop/frames.hpp"
 #include "experiments/loop/player.hpp"
 #include "experiments/loop/simulation.hpp"
 #include "experiments/results/table.hpp"
@@ -38,7 +39,7 @@ Exit codes: 0 no penetration and equal answers, 1 a penetration or a difference,
 struct LoopArguments {
   loop::SimulationOptions simulation;
   loop::PlaySettings playing;
-  std::string detect = "refit", out, recording;
+  std::string detect = "refit", out, recording, clip;
   double keep = 1;
 };
 
@@ -146,8 +147,17 @@ int play_recording(const LoopArguments& arguments) {
   return guarantee_broken;
 }
 
+int write_clip(const LoopArguments& arguments) {
+  const std::uint64_t count =
+      loop::save_iterates(arguments.recording, arguments.clip, arguments.playing.most_iterates);
+  print(counted(count, "iterate") + " written. To play them with any strategy:\n  kbvh run --body file=" +
+        arguments.clip + "/iterates.obj,motion=" + arguments.clip + "/iterates.pc2 --self --l 1\n");
+  return success;
+}
+
 int run_loop(const LoopArguments& arguments) {
   try {
+    if (!arguments.clip.empty()) return write_clip(arguments);
     return arguments.recording.empty() ? run_simulation(arguments) : play_recording(arguments);
   } catch (const std::invalid_argument& problem) {
     throw io::InputError(problem.what());
@@ -169,7 +179,7 @@ void add_loop(CLI::App& program, Action& action) {
       add_whole(*command, "--seed", options.seed, ranges::any, "of the scene's random numbers (1)"),
       add_whole(*command, "--steps", options.steps, {1, 100000000},
                 "of 0.01 s, those of an earlier run included (200)"),
-      add_text(*command, "--detect", a->detect, "anew, refit or kept (refit)"),
+      add_text(*command, "--detect", a->detect, "rebuild, refit or kept (refit)"),
       add_number(*command, "--keep", a->keep, 1e-3, 1e3,
                  "with kept: how far vertices move until candidates are found again, in radii (1)"),
       add_whole(*command, "--save-every", options.save_every, {1, 1000000},
@@ -185,6 +195,9 @@ void add_loop(CLI::App& program, Action& action) {
       ->needs(play);
   add_whole(*command, "--iterates", a->playing.most_iterates, {1, 1000000000},
             "with --play: stop after so many")
+      ->needs(play);
+  add_text(*command, "--clip", a->clip,
+           "with --play: instead write the iterates to this folder, as a clip for kbvh run")
       ->needs(play);
   add_whole(*command, "--lose", options.lose_every, {1, 1000000},
             "a fault, to see what it does: lose one pair of so many");

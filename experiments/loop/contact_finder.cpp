@@ -3,6 +3,7 @@
 #include <chrono>
 #include <stdexcept>
 
+#include "core/base/hasher.hpp"
 #include "experiments/common/stopwatch.hpp"
 #include "experiments/common/text.hpp"
 
@@ -14,18 +15,18 @@ constexpr GroupMask moving_group{1, ~std::uint32_t(0)}, fixed_group{2, ~std::uin
 
 /// Returns whether the seeded fault takes a pair.
 bool is_lost(CandidateKind kind, const Candidate& pair, std::uint32_t every) {
-  std::uint64_t z = (std::uint64_t(pair.first) << 32 | pair.second) * 8 + std::uint64_t(kind);
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
-  return (z ^ (z >> 31)) % every == 0;
+  Hasher hash;
+  hash.mix(std::uint64_t(pair.first) << 32 | pair.second);
+  hash.mix(std::uint64_t(kind));
+  return (hash.value() >> 32) % every == 0;
 }
 
 }  // namespace
 
 const char* name(Detection detection) {
   switch (detection) {
-    case Detection::anew:
-      return "anew";
+    case Detection::rebuild:
+      return "rebuild";
     case Detection::refit:
       return "refit";
     case Detection::kept:
@@ -36,7 +37,7 @@ const char* name(Detection detection) {
 
 Detection detection(const std::string& word) {
   std::vector<std::string> known;
-  for (const Detection one : {Detection::anew, Detection::refit, Detection::kept}) {
+  for (const Detection one : {Detection::rebuild, Detection::refit, Detection::kept}) {
     if (word == name(one)) return one;
     known.emplace_back(name(one));
   }
@@ -72,13 +73,13 @@ void IterateDetector::build(const Positions& x) {
 
 void IterateDetector::update(const Positions& x) {
   if (!broad_.built()) return build(x);
-  if (settings_.detection == Detection::anew) broad_.forget_trees();
+  if (settings_.detection == Detection::rebuild) broad_.forget_trees();
   broad_.update(x);
 }
 
 void IterateDetector::update(const Positions& x, const Positions& end) {
   if (!broad_.built()) build(x);
-  if (settings_.detection == Detection::anew) broad_.forget_trees();
+  if (settings_.detection == Detection::rebuild) broad_.forget_trees();
   broad_.update(x, end);
 }
 

@@ -12,11 +12,11 @@ namespace kbvh::experiments::loop {
 
 /// The ways to find pairs at iterate after iterate.
 enum class Detection : std::uint8_t {
-  anew,   ///< new trees and a search at each
-  refit,  ///< trees are refitted, then searched
-  kept,   ///< candidates are kept until a vertex has moved by a bound
+  rebuild,  ///< new trees and a search at each
+  refit,    ///< trees are refitted, then searched
+  kept,     ///< candidates are kept until a vertex has moved by a bound
 };
-/// Returns the way in words: anew, refit, kept.
+/// Returns the way in words: rebuild, refit, kept.
 const char* name(Detection detection);
 /// Finds a way by its name. Throws std::invalid_argument that lists the known names.
 Detection detection(const std::string& name);

@@ -168,7 +168,7 @@ PlayResult play(const std::filesystem::path& file, const PlaySettings& settings,
   std::vector<std::unique_ptr<Contestant>> contestants;
   for (const IterateQuestion question :
        {IterateQuestion::near, IterateQuestion::swept, IterateQuestion::impact}) {
-    for (const Detection detection : {Detection::refit, Detection::anew})
+    for (const Detection detection : {Detection::refit, Detection::rebuild})
       contestants.push_back(std::make_unique<Contestant>(header, question, detection, 0, 0));
     for (const double keep : settings.keep)
       contestants.push_back(

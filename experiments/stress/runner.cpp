@@ -79,7 +79,7 @@ double largest_coordinate(const Scene<S>& scene) {
 
 std::uint64_t events_of(const Counters& counters) {
   return counters[Counter::certificates_failed] + counters[Counter::overlap_events] +
-         counters[Counter::fathers_apart_events] + counters[Counter::leaves_apart_events];
+         counters[Counter::parents_apart_events] + counters[Counter::leaves_apart_events];
 }
 
 template <class S>

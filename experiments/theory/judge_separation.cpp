@@ -26,10 +26,11 @@ Claim judge_separation_list(const std::vector<SeparationRun>& separations) {
           "entries that differ from a traversal between events; pairs and comparisons per event of "
           "each kind; pairs of a box",
       .bound =
-          "0 differences; four pairs per overlap and fathers event; 1.4405 log2(events + 2) + 1 comparisons "
+          "0 differences; four pairs per overlap and event of parents apart; 1.4405 log2(events + 2) + 1 "
+          "comparisons "
           "per operation; a box in no more pairs than there are nodes",
       .condition =
-          "costs are counted per added or removed pair: new pairs may overlap at once, and removing a father "
+          "costs are counted per added or removed pair: new pairs may overlap at once, and removing a parent "
           "removes all pairs below it",
       .data = separations};
   if (separations.empty()) return undecided(claim, "No separation list was played.");
@@ -43,8 +44,8 @@ Claim judge_separation_list(const std::vector<SeparationRun>& separations) {
     claim.criteria.push_back(
         {"audits between events, " + where, double(run.audits), Relation::at_least, 1, 0, always});
     const double bound = 1.4405 * std::log2(double(run.queue_peak + 12 * run.polygons) + 2) + 1;
-    const SeparationRun::Kind* kinds[4] = {&run.overlap, &run.fathers, &run.leaves, &run.changes};
-    const char* names[4] = {"overlap", "fathers apart", "leaves apart", "BV change"};
+    const SeparationRun::Kind* kinds[4] = {&run.overlap, &run.parents, &run.leaves, &run.changes};
+    const char* names[4] = {"overlap", "parents apart", "leaves apart", "BV change"};
     for (int i = 0; i < 4; ++i) {
       claim.criteria.push_back({std::string("comparisons per operation, ") + names[i] + ", " + where,
                                 kinds[i]->most_steps_per_operation, Relation::at_most, bound, 0, always});
@@ -65,11 +66,12 @@ Claim judge_separation_list(const std::vector<SeparationRun>& separations) {
   }
   const auto mean = [&](int i) { return double(pairs[i]) / double(std::max<std::uint64_t>(events[i], 1)); };
   claim.measured = fmt::format(
-      "{} differences in {} entries; an overlap makes {:.2f} pairs, a father removes {:.2f}, {} at most",
+      "{} differences in {} entries; an overlap makes {:.2f} pairs, a parent removes {:.2f}, {} at most",
       number(differences), number(entries), mean(0), mean(1), number(most));
   claim.why = fmt::format(
       "{} traversals between events, in rational arithmetic, found {} entries and {} that differ; {} overlap "
-      "and {} fathers events make or remove {:.2f} and {:.2f} pairs on average, where the paper has four, "
+      "and {} events of parents apart make or remove {:.2f} and {:.2f} pairs on average, where the paper has "
+      "four, "
       "and {} at most; {} leaves events touch their own pair only, {} tree events {:.2f} nodes and pairs. "
       "The queues took up to {:.0f}% of the comparisons allowed, a box was in {} pairs at most, and the list "
       "had up to {:.2g} entries per polygon.",

@@ -162,7 +162,7 @@ SeparationRun measure_separation(const Scene<float>& scene, std::uint32_t instan
       const Counters after = paper.strategy().counters();
       const auto added = [&](Counter c) { return after[c] - before[c]; };
       SeparationRun::Kind& kind = added(Counter::overlap_events) > 0         ? run.overlap
-                                  : added(Counter::fathers_apart_events) > 0 ? run.fathers
+                                  : added(Counter::parents_apart_events) > 0 ? run.parents
                                   : added(Counter::leaves_apart_events) > 0  ? run.leaves
                                                                              : run.changes;
       ++kind.events;

@@ -182,14 +182,14 @@ struct SeparationRun {
   };
   std::string scene;
   std::uint64_t polygons = 0;  ///< of all bodies
-  Kind overlap, fathers, leaves, changes;
+  Kind overlap, parents, leaves, changes;
   std::uint64_t list_peak = 0, queue_peak = 0, bytes = 0;
   std::uint64_t most_of_box = 0;  ///< largest number of pairs with one box, at keyframes
   std::uint64_t audits = 0, entries = 0, differences = 0;  ///< list against traversals between events
 };
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SeparationRun::Kind, events, pairs, most_pairs, steps, operations,
                                    most_steps_per_operation)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SeparationRun, scene, polygons, overlap, fathers, leaves, changes,
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SeparationRun, scene, polygons, overlap, parents, leaves, changes,
                                    list_peak, queue_peak, bytes, most_of_box, audits, entries, differences)
 
 /// The largest sizes of the separation list at keyframes.

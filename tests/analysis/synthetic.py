@@ -120,7 +120,7 @@ def record(
             "nodes_visited": 2 * primitives * frames, "values_written": int(2.4 * events) if event else 12 * primitives * frames,
             "vertex_reads": 3 * primitives * frames, "positions_fetched": 0, "certificates_made": int(events * 3),
             "certificates_failed": int(events), "certificates_discarded": int(events), "internal_events": int(events * 0.4),
-            "overlap_events": 0, "fathers_apart_events": 0, "leaves_apart_events": 0, "bound_change_events": 0, "list_peak": 0,
+            "overlap_events": 0, "parents_apart_events": 0, "leaves_apart_events": 0, "bound_change_events": 0, "list_peak": 0,
             "queue_operations": int(events * 4), "queue_steps": int(events * 40), "queue_peak": primitives if event else 0,
             "box_tests": 40 * candidates, "triangle_tests": candidates, "triangle_tests_exact": pairs // 50, "bytes": 0,
         },

@@ -13,6 +13,7 @@ import paths
 from advice import advice, cells_file
 from ratios import ageing
 import synthetic
+from results import scene_names
 from results.load import ResultError, Study, load
 from synthetic import line
 
@@ -74,9 +75,17 @@ class TestRule(unittest.TestCase):
             one["strategy"].update(baseline=True)
         best = taken(lines)[0]
         self.assertEqual(best.id, "lazy")
-        self.assertEqual(best.says, "the best refit in 1 of 3 cells; at worst 0.91 times as fast as that one")
+        self.assertEqual(best.says, "the best refit in 1 of 3 cells; elsewhere at worst 0.91 times as fast")
+        for one in lines[3:5]:
+            one["times"] = line("lazy", 1.004)["times"]
+        self.assertEqual(taken(lines)[0].says, "the best refit in 1 of 3 cells; elsewhere less than 1\u00a0% slower")
         lines[-1]["times"]["disturbed"] = "9 involuntary switches"
-        self.assertTrue(taken(lines)[0].says.endswith("as that one (the machine was disturbed)"))
+        self.assertTrue(taken(lines)[0].says.endswith("slower (the machine was disturbed)"))
+
+    def test_built_in_scenes_are_named_in_words(self) -> None:
+        for name, said in (("waving_sheet", "waving sheet"), ("waving_sheet-800", "waving sheet-800"), ("tablecloth", "tablecloth"),
+                           ("my_scene.obj", "my_scene.obj"), ("waving_sheet (coherent rays)", "waving sheet (coherent rays)")):  # fmt: skip
+            self.assertEqual(scene_names.words(name), said)
 
     def test_a_range_of_few_rounds_is_not_called_an_interval(self) -> None:
         for rounds, word in ((5, "95\u00a0% interval"), (3, "range of its rounds")):

@@ -243,7 +243,7 @@ TEST(PlanRepairs, AChangedLeafThatIsNotJoinedAgain) {
 TEST(PlanRepairs, AnAncestorsBoxThatIsNotEnlarged) {
   expect<Fault::root_left_out>("protrudes", true);
 }
-TEST(PlanRepairs, SlabsOfChangedLeavesThatAreNotMadeAnew) {
+TEST(PlanRepairs, SlabsOfChangedLeavesThatAreNotRemade) {
   expect<Fault::slabs_kept>("t = ", true);
 }
 TEST(PlanRepairs, ASpanThatIsNotCut) {

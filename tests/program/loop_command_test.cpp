@@ -29,9 +29,21 @@ TEST_F(Binary, LoopRunsRecordsAndReplays) {
 
   const Outcome play = kbvh("loop --play out/loop.recording --truth-every 5");
   EXPECT_EQ(play.code, 0) << play.err;
-  for (const char* word : {"near", "swept", "impact", "anew", "kept, 0.5 radii"})
+  for (const char* word : {"near", "swept", "impact", "rebuild", "kept, 0.5 radii"})
     EXPECT_NE(play.out.find(word), std::string::npos) << word << "\n" << play.out;
-  for (const std::string& out : {run.out, play.out}) {
+
+  const Outcome clip = kbvh("loop --play out/loop.recording --clip iterates --iterates 9");
+  EXPECT_EQ(clip.code, 0) << clip.err;
+  EXPECT_NE(clip.out.find("9 iterates"), std::string::npos) << clip.out;
+  const Outcome compared = kbvh(
+      "run --body file=iterates/iterates.obj,motion=iterates/iterates.pc2 --self --l 1 --repetitions 1 "
+      "--strategies bottom_up,front --out clip");
+  EXPECT_EQ(compared.code, 0) << compared.err;
+  const std::vector<json> contestants = records("clip/results.jsonl");
+  ASSERT_EQ(contestants.size(), 2u);
+  EXPECT_EQ(contestants[0].at("scene").at("frames"), 9);
+
+  for (const std::string& out : {run.out, play.out, clip.out}) {
     std::size_t longest = 0, begin = 0;
     for (std::size_t end = out.find('\n'); end != std::string::npos;
          begin = end + 1, end = out.find('\n', begin))
@@ -76,6 +88,7 @@ TEST_F(Binary, LoopRefusesInOneSentence) {
                                                  {"loop --frames 3", "--frames: needs --out"},
                                                  {"loop --play nothing", "nothing"},
                                                  {"loop --play x --scene sphere", "--play"},
+                                                 {"loop --clip x", "--play"},
                                                  {"loop --truth-every 3", "--play"}};
   for (const auto& [arguments, part] : cases) {
     const Outcome outcome = kbvh(arguments);

@@ -122,7 +122,7 @@ class Auditor {
 constexpr std::string_view avl = AvlQueue<float>::name, segment_heap = SegmentHeapQueue<float>::name;
 
 struct Kinds {
-  std::uint64_t overlap = 0, fathers = 0, leaves = 0, changes = 0, geometry = 0;
+  std::uint64_t overlap = 0, parents = 0, leaves = 0, changes = 0, geometry = 0;
   bool operator==(const Kinds&) const = default;
 };
 
@@ -185,7 +185,7 @@ Kinds play(const std::string& name, const BuilderConfig& builder, std::uint64_t 
     every = std::max<std::uint64_t>(1, events / audits);
     compared = auditor.audits;
     const Counters& table = count;
-    kinds = {table[Counter::overlap_events], table[Counter::fathers_apart_events],
+    kinds = {table[Counter::overlap_events], table[Counter::parents_apart_events],
              table[Counter::leaves_apart_events], table[Counter::bound_change_events], geometry};
     if (auditing && geometry != 0)
       std::printf("%s: %llu changes of geometry: %llu pairs removed, %llu decided\n", name.c_str(),
@@ -193,10 +193,10 @@ Kinds play(const std::string& name, const BuilderConfig& builder, std::uint64_t 
                   (unsigned long long)edits.decided);
     if (auditing)
       std::printf(
-          "%s: %llu audits of %llu entries in all; events: overlap %llu, fathers %llu, leaves %llu, "
+          "%s: %llu audits of %llu entries in all; events: overlap %llu, parents %llu, leaves %llu, "
           "changes %llu; list at most %llu\n",
           name.c_str(), (unsigned long long)compared, (unsigned long long)auditor.entries,
-          (unsigned long long)kinds.overlap, (unsigned long long)kinds.fathers,
+          (unsigned long long)kinds.overlap, (unsigned long long)kinds.parents,
           (unsigned long long)kinds.leaves, (unsigned long long)kinds.changes,
           (unsigned long long)table[Counter::list_peak]);
   }
@@ -323,12 +323,12 @@ TEST(SeparationListEvents, EachKindHappensOftenInTheTestScenes) {
   for (const char* name : {"soups", "sheets", "plan_changes"}) {
     const Kinds kinds = play<float>(name, {.width = 2, .leaf_size = 1}, 1, avl);
     all.overlap += kinds.overlap;
-    all.fathers += kinds.fathers;
+    all.parents += kinds.parents;
     all.leaves += kinds.leaves;
     all.changes += kinds.changes;
   }
   EXPECT_GE(all.overlap, 1000u);
-  EXPECT_GE(all.fathers, 1000u);
+  EXPECT_GE(all.parents, 1000u);
   EXPECT_GE(all.leaves, 1000u);
   EXPECT_GE(all.changes, 1000u);
 }

@@ -272,7 +272,7 @@ TEST(Verdict, SeparationLists) {
   run.scene = "cloth", run.polygons = 1000, run.queue_peak = 3000;
   run.audits = 20, run.entries = 50000, run.most_of_box = 100, run.list_peak = 2500;
   run.overlap = {100, 400, 4, 5000, 500, 12.0};
-  run.fathers = {100, 400, 4, 5000, 500, 12.0};
+  run.parents = {100, 400, 4, 5000, 500, 12.0};
   const std::vector<SeparationRun> good{run};
   expect_flip(good, holds, fails, judge_separation_list, [](SeparationRun& r) { r.differences = 1; });
   expect_flip(good, holds, fails, judge_separation_list, [](SeparationRun& r) { r.audits = 0; });

@@ -68,7 +68,7 @@ std::uint64_t hash_of(const LoadedScene& scene) {
 
 class BuiltinScenes : public testing::TestWithParam<std::string> {
  protected:
-  // Simulated anew: a file in the user's cache could be of another solver.
+  // Simulated again: a file in the user's cache could be of another solver.
   static void SetUpTestSuite() {
     std::string folder = (std::filesystem::temp_directory_path() / "kbvh-scenes-XXXXXX").string();
     ASSERT_NE(::mkdtemp(folder.data()), nullptr);

@@ -90,7 +90,7 @@ TEST_P(EveryScene, HasNoPenetrationInTwoHundredSteps) {
 TEST_P(EveryScene, AllWaysToDetectGiveTheSameBits) {
   SimulationOptions options = small(GetParam(), 30);
   const std::uint64_t refit = hash_of_state(simulate(options).state);
-  options.detection = Detection::anew;
+  options.detection = Detection::rebuild;
   EXPECT_EQ(hash_of_state(simulate(options).state), refit);
   for (const double keep : {0.1, 1.0, 5.0}) {
     options.detection = Detection::kept;

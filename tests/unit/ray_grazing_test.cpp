@@ -22,7 +22,7 @@ namespace {
 /// The rays of each kind on each scene. The variable KBVH_GRAZING_RAYS asks for more.
 std::uint32_t rays_of_a_kind() {
   const char* const asked = std::getenv("KBVH_GRAZING_RAYS");
-  return asked != nullptr ? std::uint32_t(std::atoi(asked)) : 400;
+  return asked != nullptr ? std::uint32_t(std::atoi(asked)) : 150;
 }
 
 enum class Shape : std::uint8_t { flat, waves, folds };

@@ -185,13 +185,13 @@ class WideEdits : public testing::TestWithParam<std::tuple<BuildMethod, std::uin
   }
 };
 
-TEST_P(WideEdits, EqualALayoutMadeAnewInFloat) {
+TEST_P(WideEdits, EqualARemadeLayoutInFloat) {
   using Op = Edited<float>::Op;
   edit_at_random<float>(config(), {Op::exchange});
   edit_at_random<float>(config(), {Op::exchange, Op::regrow, Op::reinsert});
   if (config().width == 2) edit_at_random<float>(config(), {Op::swap});
 }
-TEST_P(WideEdits, EqualALayoutMadeAnewInDouble) {
+TEST_P(WideEdits, EqualARemadeLayoutInDouble) {
   using Op = Edited<double>::Op;
   edit_at_random<double>(config(), {Op::exchange, Op::reinsert});
   edit_at_random<double>(config(), {Op::regrow, Op::reinsert});

@@ -170,7 +170,7 @@ export function smallNumbers(walker) {
   put("combs.products", primitives(scenes.combs().bodies[0]) ** 2);
   put("combs.nodes", nodes("combs"));
   put("combs.events", combs.steps.length);
-  for (const kind of ["overlap_events", "fathers_apart_events", "leaves_apart_events", "bound_change_events", "list_peak"]) put("combs." + kind, last(combs, kind));
+  for (const kind of ["overlap_events", "parents_apart_events", "leaves_apart_events", "bound_change_events", "list_peak"]) put("combs." + kind, last(combs, kind));
   put("combs.frames_with_pairs", combs.frames.filter((frame) => frame.pairs.length > 0).length);
   put("combs.frames", combs.frames.length);
   put("combs.refit_box_tests", last(trace("combs.refit"), "box_tests"));

@@ -81,7 +81,7 @@ function extract(theory, prefix, source, put) {
   put(prefix + ".list.audits", sum(lists, (run) => run.audits), source);
   put(prefix + ".list.differences", sum(lists, (run) => run.differences), source);
   put(prefix + ".list.most_of_box", most(lists, (run) => run.most_of_box), source);
-  for (const kind of ["overlap", "fathers", "leaves", "changes"]) {
+  for (const kind of ["overlap", "parents", "leaves", "changes"]) {
     put(`${prefix}.list.${kind}_events`, events(kind), source);
     put(`${prefix}.list.${kind}_pairs`, pairs(kind) / Math.max(1, events(kind)), source);
     put(`${prefix}.list.${kind}_most`, most(lists, (run) => run[kind].most_pairs), source);

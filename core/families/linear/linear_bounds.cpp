@@ -198,7 +198,7 @@ bool LinearBounds<S>::advance() {
     came_ahead_ = step_ahead(std::numeric_limits<std::uint64_t>::max());
   }
   if (came_ahead_) {
-    horizon_.next_segment(share_made_anew());
+    horizon_.next_segment(share_remade());
     present_ = 1 - present_;
     for (std::uint32_t body = 0; body < body_count(); ++body)
       counts_[body].at_rest += ahead_counts_[body].at_rest;
@@ -268,12 +268,12 @@ void LinearBounds<S>::next_segment() {
   forget_ahead();
   knots_.clear();
   clear_changed();
-  horizon_.next_segment(share_made_anew());
+  horizon_.next_segment(share_remade());
   const double t = motion_.time();
   const Segment& before = segments_[present_];
   Segment& segment = segments_[1 - present_];
-  const bool anew = before.end == none, new_knot = anew || t >= before.knot || before.end >= before.knot;
-  if (!anew) foreseen_ = std::min(16.0, 2 * foreseen_);
+  const bool first = before.end == none, new_knot = first || t >= before.knot || before.end >= before.knot;
+  if (!first) foreseen_ = std::min(16.0, 2 * foreseen_);
   segment.pieces = whole_ ? 1 : new_knot ? cuts_.pieces : before.pieces;
   choose_segment(segment, motion_, t);
   const double chosen_end = segment.end;

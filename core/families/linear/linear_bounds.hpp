@@ -170,7 +170,7 @@ class LinearBounds {
   bool pass_knots();
   bool remake_boxes();
   bool is_near_as_before();
-  double share_made_anew();
+  double share_remade();
 
   SceneView<S> scene_;
   SegmentMotion<S> motion_;

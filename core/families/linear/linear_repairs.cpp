@@ -222,7 +222,7 @@ bool LinearBounds<S>::is_near_as_before() {
 
 /// Returns the share of all leaves that were recomputed since the last call.
 template <class S>
-double LinearBounds<S>::share_made_anew() {
+double LinearBounds<S>::share_remade() {
   std::uint64_t all = 1;
   for (const LinearBody<S>& body : bodies_) all += body.hierarchy.leaf_count();
   const std::uint64_t before = std::exchange(leaves_before_, repairs_.leaves);
@@ -245,7 +245,7 @@ template void LinearBounds<float>::follow_line(std::uint32_t, std::uint32_t, dou
                                                const float*);
 template bool LinearBounds<float>::remake_boxes();
 template bool LinearBounds<float>::is_near_as_before();
-template double LinearBounds<float>::share_made_anew();
+template double LinearBounds<float>::share_remade();
 template void LinearBounds<float>::clear_changed();
 template bool LinearBounds<double>::repair(std::span<const PlanChange<double>>);
 template bool LinearBounds<double>::pass_knots();
@@ -256,7 +256,7 @@ template void LinearBounds<double>::follow_line(std::uint32_t, std::uint32_t, do
                                                 const double*);
 template bool LinearBounds<double>::remake_boxes();
 template bool LinearBounds<double>::is_near_as_before();
-template double LinearBounds<double>::share_made_anew();
+template double LinearBounds<double>::share_remade();
 template void LinearBounds<double>::clear_changed();
 
 }  // namespace kbvh

@@ -382,7 +382,7 @@ class SeparationList {
 
   static State state(const BoxPair& pair) { return pair.overlapping ? State::overlapping : State::apart; }
   Counter kind_of_separation(const BoxPair& pair) const {
-    return tree_.both_leaves(pair) ? Counter::leaves_apart_events : Counter::fathers_apart_events;
+    return tree_.both_leaves(pair) ? Counter::leaves_apart_events : Counter::parents_apart_events;
   }
   void remove(std::uint32_t slot) {
     tree_.remove(slot);

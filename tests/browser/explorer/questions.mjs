@@ -149,6 +149,15 @@ await check("three questions are answered by a name, an interval and a curve", a
   leave(page);
 });
 
+await check("what was not asked for is said", async () => {
+  const page = await open("reference");
+  const kinds = await page.evaluate(() => [...new Set(window.explorer.situations().map(({ asks }) => asks))]);
+  assert.ok(!kinds.includes("rays"));
+  assert.match(await page.$eval(".questions .note", (one) => one.textContent), /^Not measured in these results: [^.]*rays\. The report says what is known of them\.$/);
+  assert.equal(await page.$eval(".questions .note a", (one) => one.getAttribute("href")), "report.html");
+  leave(page);
+});
+
 await check("a range of few rounds is not called an interval", async () => {
   const page = await open("reference", "#know=next&of=blender/dancer-skirt");
   assert.match(await page.$eval(".answer", (one) => one.textContent), /^Take [^:]+: [\d.]+ ms a frame \(range of its rounds [\d.]+ to [\d.]+\)\.That is [\d.]+ times as fast as the best refit \(range of its rounds [\d.]+ to [\d.]+\)/);

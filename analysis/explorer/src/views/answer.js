@@ -68,7 +68,11 @@ function buttons(question, options, chosen, change, absent = () => false) {
 
 const names = (classes) => Object.fromEntries(Object.entries(classes).map(([key, one]) => [key, one.name]));
 
-function questions({ state, set }, found) {
+/** Questions that users have, by their names as `found.kinds` has them. */
+const COMMON = ["pairs within a body, too", "rays"];
+
+function questions({ model, state, set }, found) {
+  const absent = COMMON.filter((kind) => !found.kinds.includes(kind));
   const kinds = Object.fromEntries(found.kinds.map((kind) => [kind, kind]));
   const scenes = { "": "any scene", ...Object.fromEntries(found.scenes.map((scene) => [scene, scene])) };
   return make(
@@ -86,6 +90,7 @@ function questions({ state, set }, found) {
         choice("asked for", kinds, found.asks, (asks) => set({ asks })),
         choice("scene", scenes, found.scene, (of) => set({ of })),
       ),
+      absent.length > 0 && make("p", { class: "note" }, `Not measured in these results: ${absent.join(", ")}.`, model.data.report && [" ", make("a", { href: model.data.report, text: "The report" }), " says what is known of them."]),
     ),
   );
 }
@@ -100,7 +105,8 @@ export function speedText(one) {
   }
   if (one.contestant.baseline) {
     const where = one.cells === 1 ? "in the only cell" : `in ${one.bestIn} of ${plural(one.cells, "cell")}`;
-    return `the best refit ${where}${one.bestIn < one.cells ? `; at worst ${factor(one.low)} times as fast as that one` : ""}${missing}${disturbed}`;
+    const behind = factor(one.low) === "1.00" ? "less than 1\u00a0% slower" : `at worst ${factor(one.low)} times as fast`;
+    return `the best refit ${where}${one.bestIn < one.cells ? `; elsewhere ${behind}` : ""}${missing}${disturbed}`;
   }
   const span = one.low < one.high ? `${factor(one.low)} to ${factor(one.high)}` : "";
   const kind = one.isInterval ? "95\u00a0% interval" : "range of its rounds";
