@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Optional
 
 from results import files
-from results.load import ResultError
+from results.files import ResultError
 
 BEGIN, END = "<!-- broad phase -->\n", "<!-- /broad phase -->\n"
 VERDICTS = ("reported", "missed", "met", "met, and the aim")
