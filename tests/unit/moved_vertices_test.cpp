@@ -278,6 +278,7 @@ TEST(DirtyRefit, FollowsGeometryThatChanges) {
   for (Play<double>* const play : {&dirty, &whole}) {
     play->frame(0.5);
     play->session.change_geometry(change, play->times);
+    play->last = play->session.strategy().counters();
   }
   for (const double t : {0.75, 1.0, 1.5, 2.75, 3.5, 4.0}) {
     const Counters counts = dirty.frame(t), expected = whole.frame(t);
@@ -291,9 +292,10 @@ struct HandedIn {
   explicit HandedIn(std::uint32_t n) : scene(patch<float>(n, 4)) {
     Body<float>& body = scene.bodies[0];
     const std::uint32_t count = body.plans.vertex_count();
-    const float* const first = body.plans.keyframe(0);
-    body.plans = FlightPlans<float>::handed_in(count, {first, first + std::size_t(3) * count});
-    for (auto& array : arrays) array.assign(first, first + std::size_t(3) * count + 1);
+    std::vector<float> start(body.plans.keyframe(0), body.plans.keyframe(0) + std::size_t(3) * count);
+    body.plans = FlightPlans<float>::handed_in(count, start);
+    start.push_back(0);
+    for (auto& array : arrays) array = start;
     session.emplace(scene, Contestant{&find_strategy("dirty_refit"), {}, {.width = 8, .leaf_size = 16}});
     session->hand_in(0, arrays[0].data());
     session->reset(0);
