@@ -182,12 +182,24 @@ class World:
         """Moves scene and strategy to time t, which is not before the current one."""
         self._core.advance(t)
 
-    def set_positions(self, body: int, positions: npt.ArrayLike) -> bool:
+    def set_positions(self, body: int, positions: npt.ArrayLike, moved: Optional[npt.ArrayLike] = None) -> bool:
         """Sets the positions, [vertex][3], of a body with unknown motion, for the next `reset`, `advance` or `contacts`.
 
         An array of `padded`, or a flat one of 3 * vertices + 1 numbers, in the world's precision, is read where it lies: leave it
         unchanged until the next positions are set, and hand in another array for `contacts`. All others are copied. Returns
         whether the array is read where it lies.
+
+        `moved` lists the only vertices whose positions may differ from those at the last frame: the strategy "dirty_refit" leaves
+        out the others. Bounds are wrong if a vertex is missing in it.
+
+        >>> v = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], dtype="f4")
+        >>> bodies = [kbvh.Body([[0, 1, 2]], v, known=False), kbvh.Body([[0, 1, 2]], v + [0, 0, 1], known=False)]
+        >>> world = kbvh.World(bodies, "dirty_refit")
+        >>> v[2, 2] = 1
+        >>> copied = not world.set_positions(0, v, moved=[2])
+        >>> world.advance(1)
+        >>> len(world.pairs())
+        1
         """
         memory = getattr(positions, "base", None)
         if (
@@ -201,7 +213,7 @@ class World:
             and memory.ctypes.data == positions.ctypes.data
         ):
             positions = memory
-        return self._core.set_positions(body, positions)
+        return self._core.set_positions(body, positions, moved)
 
     def change_plans(self, change: PlanChange) -> None:
         """Gives some vertices of a body new plans from the current time on; `change.time` is not read."""

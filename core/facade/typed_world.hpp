@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
+#include "core/contract/takes_moved_vertices.hpp"
 #include "core/facade/conversions.hpp"
 #include "core/motion/admissible.hpp"
 #include "core/scene/cut_polygons.hpp"
@@ -117,7 +120,8 @@ struct TypedWorld {
   }
 
   template <class T>
-  void set(std::uint32_t body, std::span<const T> positions) {
+  void set(std::uint32_t body, std::span<const T> positions,
+           std::optional<std::span<const std::uint32_t>> moved = {}) {
     check_body(body);
     session();
     const Body<S>& target = played->bodies[body];
@@ -132,6 +136,16 @@ struct TypedWorld {
         throw std::invalid_argument("body '" + target.name + "', vertex " + std::to_string(i / 3) +
                                     ": coordinate " + number_text(double(positions[i])) +
                                     " is not finite or not admissible");
+    if (moved)
+      for (const std::uint32_t vertex : *moved)
+        if (vertex >= size / 3)
+          throw std::invalid_argument("vertex " + std::to_string(vertex) + " moved, but body '" +
+                                      target.name + "' has " + std::to_string(size / 3));
+    give(body, positions, size);
+    tell_moved(session().strategy(), body, moved);
+  }
+  template <class T>
+  void give(std::uint32_t body, std::span<const T> positions, std::size_t size) {
     if constexpr (std::is_same_v<S, T>)
       if (positions.size() == size + 1) {
         session().hand_in(body, positions.data());

@@ -99,6 +99,14 @@ void World::set_positions(std::uint32_t body, std::span<const float> positions) 
 void World::set_positions(std::uint32_t body, std::span<const double> positions) {
   in_scalar([&](auto& world) { world.set(body, positions); });
 }
+void World::set_positions(std::uint32_t body, std::span<const float> positions,
+                          std::span<const std::uint32_t> moved) {
+  in_scalar([&](auto& world) { world.set(body, positions, moved); });
+}
+void World::set_positions(std::uint32_t body, std::span<const double> positions,
+                          std::span<const std::uint32_t> moved) {
+  in_scalar([&](auto& world) { world.set(body, positions, moved); });
+}
 
 void World::change_plans(const std::vector<WorldPlan>& plans) {
   in_scalar([&]<class S>(TypedWorld<S>& world) {

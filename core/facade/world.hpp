@@ -291,6 +291,13 @@ class World {
   /// array of 3 * vertices numbers is copied.
   void set_positions(std::uint32_t body, std::span<const float> positions);
   void set_positions(std::uint32_t body, std::span<const double> positions);
+  /// Does the same where only the vertices `moved` may differ from their positions at the last frame: a
+  /// strategy that uses this (`dirty_refit`) leaves out the others. A list that lacks a vertex makes bounds
+  /// wrong. Throws std::invalid_argument for a vertex out of range.
+  void set_positions(std::uint32_t body, std::span<const float> positions,
+                     std::span<const std::uint32_t> moved);
+  void set_positions(std::uint32_t body, std::span<const double> positions,
+                     std::span<const std::uint32_t> moved);
   /// Replaces the plans of vertices at the current time.
   void change_plans(const std::vector<WorldPlan>& plans);
   /// Inserts and deletes vertices and primitives at the current time.

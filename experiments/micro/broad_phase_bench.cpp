@@ -1,236 +1,37 @@
 // The time of kbvh::broad_phase relative to other ways to the same pairs, in one run and by turns: swept
-// vertex-face and edge-edge candidates between two frames from scratch and with a known tree, iterates within
-// a bound, updates of few vertices, and candidates between groups. Prints medians of processor time in ms and
-// ratios, and compares them with targets; FILE receives all times, ratios and targets.
+// vertex-face and edge-edge candidates between two frames, from scratch and with a known tree; iterates
+// within a bound; updates of few vertices; candidates between groups; self intersections of cloth with cones
+// and without. Prints medians of processor time in ms and ratios, and compares them with targets; FILE
+// receives all times, ratios and targets, for analysis/broad_phase_targets.py.
 //   kbvh_broad_phase_bench [FRAMES] [REPETITIONS] [FILE]
-// FRAMES is a folder with a pair of frames (default: cloth-ball of the data folder).
+// FRAMES is a folder with a pair of frames (default: cloth-ball of the data folder); without it, rows that
+// need one are left out.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <ctime>
+#include <exception>
 #include <filesystem>
-#include <fstream>
-#include <functional>
-#include <map>
-#include <nlohmann/json.hpp>
+#include <list>
 #include <numeric>
-#include <stdexcept>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/broad_phase/broad_phase.hpp"
-#include "core/families/sweep/sorted_boxes.hpp"
+#include "core/contract/takes_moved_vertices.hpp"
 #include "core/judge/session.hpp"
 #include "experiments/common/environment.hpp"
-#include "experiments/common/machine.hpp"
 #include "experiments/study/box_candidates.hpp"
 #include "experiments/study/contestants.hpp"
+#include "frame_mesh.hpp"
+#include "self_intersections.hpp"
+#include "swept_rivals.hpp"
+#include "turns_table.hpp"
 
-namespace kbvh::experiments {
+namespace kbvh::experiments::micro {
 namespace {
-
-/// The processor's time of this program, which has one thread: other programs disturb it least.
-double milliseconds() {
-  return 1e3 * double(std::clock()) / CLOCKS_PER_SEC;
-}
-
-/// Work that is timed by turns with its rivals.
-struct Contestant {
-  std::string name;
-  std::function<std::size_t()> work;  ///< returns the number of pairs
-  std::vector<double> ms{};
-  std::size_t pairs = 0;
-};
-
-/// What was compared in this run, for the file and for targets.
-class Table {
- public:
-  /// Plays all contestants once without a clock, then by turns, and prints medians and how many times as long
-  /// as the first each one takes.
-  void compare(const std::string& title, std::vector<Contestant> contestants, int repetitions) {
-    for (int r = -1; r < repetitions; ++r)
-      for (Contestant& contestant : contestants) {
-        const double begin = milliseconds();
-        contestant.pairs = contestant.work();
-        const double took = milliseconds() - begin;
-        if (r >= 0) contestant.ms.push_back(took);
-      }
-    std::printf("%s\n", title.c_str());
-    nlohmann::json rows = nlohmann::json::array();
-    double first = 0;
-    for (Contestant& contestant : contestants) {
-      std::sort(contestant.ms.begin(), contestant.ms.end());
-      const double median = contestant.ms[contestant.ms.size() / 2];
-      if (first == 0) first = median;
-      medians_[contestant.name] = median;
-      std::printf("  %-56s %10.3f ms  %7.2f x  %zu pairs\n", contestant.name.c_str(), median, median / first,
-                  contestant.pairs);
-      rows.push_back({{"name", contestant.name},
-                      {"median_ms", median},
-                      {"ms", contestant.ms},
-                      {"over_first", median / first},
-                      {"pairs", contestant.pairs}});
-    }
-    comparisons_.push_back({{"title", title}, {"contestants", rows}});
-  }
-
-  /// Compares how many times as long as `ours` the rival takes with what is at least asked for, and with the
-  /// aim; 0: none is. Does nothing if one of them was not measured.
-  void target(const char* what, const std::string& ours, const std::string& rival, double at_least,
-              double aim) {
-    if (!medians_.contains(ours) || !medians_.contains(rival)) return;
-    const double ratio = medians_.at(rival) / medians_.at(ours);
-    const char* const verdict = at_least == 0      ? "reported"
-                                : ratio < at_least ? "missed"
-                                : ratio < aim      ? "met"
-                                                   : "met, and the aim";
-    targets_.push_back({{"what", what},
-                        {"ours", ours},
-                        {"rival", rival},
-                        {"ratio", ratio},
-                        {"at_least", at_least},
-                        {"aim", aim},
-                        {"verdict", verdict}});
-  }
-  void not_measured(const char* what, const char* why) {
-    targets_.push_back({{"what", what}, {"ratio", nullptr}, {"verdict", "not measured"}, {"why", why}});
-  }
-
-  void print_targets() const {
-    std::printf("Targets\n");
-    for (const nlohmann::json& target : targets_) {
-      const std::string what = target["what"], verdict = target["verdict"];
-      if (target["ratio"].is_null())
-        std::printf("  %-78s %s: %s\n", what.c_str(), verdict.c_str(),
-                    target["why"].get<std::string>().c_str());
-      else
-        std::printf("  %-78s %7.2f x  (%g, aim %g): %s\n", what.c_str(), target["ratio"].get<double>(),
-                    target["at_least"].get<double>(), target["aim"].get<double>(), verdict.c_str());
-    }
-  }
-  void write(const std::filesystem::path& file, const std::string& frames, int repetitions) const {
-    const nlohmann::json result{{"program", "kbvh_broad_phase_bench"},
-                                {"time", now_utc()},
-                                {"commit", commit()},
-                                {"dirty", dirty()},
-                                {"machine", machine()},
-                                {"kernels", name(active_kernel_set())},
-                                {"frames", frames},
-                                {"repetitions", repetitions},
-                                {"clock", "processor time, median of repetitions by turns, one thread"},
-                                {"comparisons", comparisons_},
-                                {"targets", targets_}};
-    std::ofstream out(file);
-    out << result.dump(2) << '\n';
-    if (!out.flush()) throw std::runtime_error("cannot write " + file.string());
-  }
-
- private:
-  std::map<std::string, double> medians_;
-  nlohmann::json comparisons_ = nlohmann::json::array(), targets_ = nlohmann::json::array();
-};
-
-template <class S>
-struct Mesh {
-  std::vector<S> v[2];
-  MatrixView<std::uint32_t> e, f;
-  explicit Mesh(const FramePair& frames)
-      : e(MatrixView<std::uint32_t>::by_rows(frames.edges[0].data(), frames.edges.size(), 2)),
-        f(MatrixView<std::uint32_t>::by_rows(frames.faces[0].data(), frames.faces.size(), 3)) {
-    for (int i = 0; i < 2; ++i) v[i].assign(frames.positions[i].begin(), frames.positions[i].end());
-  }
-  MatrixView<S> view(int frame) const {
-    return MatrixView<S>::by_rows(v[frame].data(), v[frame].size() / 3, 3);
-  }
-};
-
-template <class S>
-std::size_t detect_both(BroadPhase<S>& broad, CandidateBuffer (&out)[2]) {
-  broad.detect_face_vertex_candidates(out[0]);
-  broad.detect_edge_edge_candidates(out[1]);
-  return out[0].size() + out[1].size();
-}
-
-/// Sort and sweep on the axis of the largest extent, by the SIMD kernels of the family `sweep`.
-class Sweep {
- public:
-  explicit Sweep(const FramePair& frames)
-      : elements_(make_elements(
-            frames.positions[0].size() / 3,
-            MatrixView<std::uint32_t>::by_rows(frames.edges[0].data(), frames.edges.size(), 2),
-            MatrixView<std::uint32_t>::by_rows(frames.faces[0].data(), frames.faces.size(), 3))) {}
-
-  std::size_t find(const Mesh<double>& mesh, CandidateBuffer (&out)[2]) {
-    const std::size_t values = mesh.v[0].size();
-    positions_.resize(2 * values + 1);
-    std::copy_n(mesh.v[0].data(), values, positions_.data());
-    std::copy_n(mesh.v[1].data(), values, positions_.data() + values);
-    for (std::size_t kind = 0; kind < element_kinds; ++kind) sort(kind);
-    run(2, 0, CandidateKind::face_vertex, out[0]);
-    run(1, 1, CandidateKind::edge_edge, out[1]);
-    return out[0].size() + out[1].size();
-  }
-
- private:
-  void sort(std::size_t kind) {
-    const Primitives& list = elements_.lists[kind];
-    if (twice_[kind].count() == 0) {
-      for (std::uint32_t p = 0; p < list.count(); ++p) {
-        std::vector<std::uint32_t> corners(list[p].begin(), list[p].end());
-        for (const std::uint32_t v : list[p]) corners.push_back(v + elements_.vertex_count());
-        twice_[kind].add(corners);
-      }
-      sorted_[kind].start(PrimitiveList(twice_[kind]), active_kernel_set());
-    }
-    const PrimitiveList all(twice_[kind]);
-    order_.take(twice_[kind], all, positions_.data(), active_kernel_set());
-    sorted_[kind].update(order_.boxes(), axis());
-  }
-  std::uint32_t axis() const {
-    std::uint32_t widest = 0;
-    double extent[3];
-    for (std::size_t k = 0; k < 3; ++k) {
-      double low = positions_[k], high = low;
-      for (std::size_t i = k; i + 1 < positions_.size(); i += 3) {
-        low = std::min(low, positions_[i]);
-        high = std::max(high, positions_[i]);
-      }
-      extent[k] = high - low;
-      if (extent[k] > extent[widest]) widest = std::uint32_t(k);
-    }
-    return widest;
-  }
-  void run(std::size_t a, std::size_t b, CandidateKind kind, CandidateBuffer& out) {
-    out.clear();
-    chunk_.resize(4096);
-    SweepJob<double> job{};
-    job.a = sorted_[a].side(0);
-    job.b = sorted_[b].side(a == b ? 0 : 1);
-    job.axis = axis();
-    job.block = SweepJob<double>::no_block;
-    job.out = chunk_.data();
-    job.out_room = chunk_.size();
-    const auto kernel = a == b ? sweep_kernels<double>(active_kernel_set()).one
-                               : sweep_kernels<double>(active_kernel_set()).two;
-    while (job.next < job.a.count) {
-      kernel(job);
-      for (std::size_t i = 0; i < job.found; ++i) {
-        Candidate pair{chunk_[i].primitive_a, chunk_[i].primitive_b};
-        if (a == b && pair.first > pair.second) std::swap(pair.first, pair.second);
-        if (!elements_.incident(kind, pair)) out.push_back(pair);
-      }
-      job.found = 0;
-    }
-  }
-
-  Elements elements_;
-  Primitives twice_[element_kinds];
-  SortedBoxes<double> sorted_[element_kinds];
-  CurveOrder<double> order_;
-  std::vector<double> positions_;
-  std::vector<FoundPair> chunk_;
-};
 
 void swept(const FramePair& frames, int repetitions, Table& table) {
   const Mesh<double> mesh(frames);
@@ -240,7 +41,11 @@ void swept(const FramePair& frames, int repetitions, Table& table) {
   known.build(mesh.view(0), mesh.view(1), mesh.e, mesh.f);
   known_float.build(mesh_float.view(0), mesh_float.view(1), mesh_float.e, mesh_float.f);
   CandidateBuffer out[2];
-  Sweep sweep(frames);
+  SortAndSweep sweep(frames);
+  StrategySweep features(frames, "bottom_up");
+  std::optional<PeerBoxes<double>> cgal;
+  if (const StrategyEntry* const entry = known_strategy("cgal_box_intersection"))
+    cgal.emplace(frames, *entry, std::vector<BodyPair>{{0, 1}, {2, 2}});
   std::vector<Contestant> contestants;
   contestants.push_back({"kbvh::broad_phase, double, new object and buffers", [&] {
                            BroadPhase<double> broad;
@@ -257,7 +62,7 @@ void swept(const FramePair& frames, int repetitions, Table& table) {
                            return detect_both(known_float, out);
                          }});
   contestants.push_back({"sort and sweep (SIMD), from scratch", [&] {
-                           Sweep fresh_sweep(frames);
+                           SortAndSweep fresh_sweep(frames);
                            CandidateBuffer fresh[2];
                            return fresh_sweep.find(mesh, fresh);
                          }});
@@ -266,8 +71,40 @@ void swept(const FramePair& frames, int repetitions, Table& table) {
                            const BoxCandidates found = box_candidates(frames, BoxMargin::none);
                            return std::size_t(found.vertex_face + found.edge_edge);
                          }});
+  contestants.push_back({"bottom_up on a scene of features, known tree", [&] { return features.find(); }});
+  if (cgal)
+    contestants.push_back({"CGAL's box_intersection_d", [&] {
+                             cgal->advance();
+                             return cgal->find();
+                           }});
   table.compare("Swept vertex-face and edge-edge candidates between two frames", std::move(contestants),
                 repetitions);
+}
+
+/// Vertex-face candidates alone, in float, on trees that stay: peers whose trees find no pairs within a body.
+void swept_by_trees(const FramePair& frames, int repetitions, Table& table) {
+  const Mesh<float> mesh(frames);
+  BroadPhase<float> known;
+  known.build(mesh.view(0), mesh.view(1), mesh.e, mesh.f);
+  CandidateBuffer out;
+  std::vector<Contestant> contestants;
+  contestants.push_back({"kbvh::broad_phase, vertex-face in float, known tree", [&] {
+                           known.update(mesh.view(0), mesh.view(1));
+                           known.detect_face_vertex_candidates(out);
+                           return out.size();
+                         }});
+  std::list<PeerBoxes<float>> peers;
+  for (const auto& [id, name] :
+       {std::pair("bullet_dbvt", "Bullet's dynamic tree"), {"embree_refit", "Embree"}}) {
+    const StrategyEntry* const entry = known_strategy(id);
+    if (entry == nullptr) continue;
+    PeerBoxes<float>& peer = peers.emplace_back(frames, *entry, std::vector<BodyPair>{{0, 1}});
+    contestants.push_back({std::string(name) + ", vertex-face in float, known tree", [&peer] {
+                             peer.advance();
+                             return peer.find();
+                           }});
+  }
+  table.compare("Swept vertex-face candidates between two frames", std::move(contestants), repetitions);
 }
 
 /// Candidates between the two largest connected parts of a mesh, chosen by groups within the search or
@@ -372,66 +209,167 @@ void iterates(const FramePair& frames, int repetitions, Table& table) {
   std::printf("  searches of the first: %llu of 40\n", (unsigned long long)detections);
 }
 
-/// A sheet of n x n vertices, of which some move.
-void moved(std::uint32_t n, int repetitions, Table& table) {
-  std::vector<float> v;
-  std::vector<std::uint32_t> e, f;
-  for (std::uint32_t y = 0; y < n; ++y)
-    for (std::uint32_t x = 0; x < n; ++x) {
-      const std::uint32_t i = y * n + x;
-      v.insert(v.end(), {float(x), float(y), float(std::sin(0.05 * x) * std::cos(0.04 * y))});
-      if (x + 1 < n) e.insert(e.end(), {i, i + 1});
-      if (y + 1 < n) e.insert(e.end(), {i, i + n});
-      if (x + 1 < n && y + 1 < n) {
-        e.insert(e.end(), {i + 1, i + n});
-        f.insert(f.end(), {i, i + 1, i + n, i + 1, i + n + 1, i + n});
+/// A sheet of n x n vertices, and the hundredth of them that moves: one patch, or scattered ones.
+class MovingSheet {
+ public:
+  explicit MovingSheet(std::uint32_t n) {
+    for (std::uint32_t y = 0; y < n; ++y)
+      for (std::uint32_t x = 0; x < n; ++x) {
+        const std::uint32_t i = y * n + x;
+        v_.insert(v_.end(), {float(x), float(y), float(std::sin(0.05 * x) * std::cos(0.04 * y))});
+        if (x + 1 < n) e_.insert(e_.end(), {i, i + 1});
+        if (y + 1 < n) e_.insert(e_.end(), {i, i + n});
+        if (x + 1 < n && y + 1 < n) {
+          e_.insert(e_.end(), {i + 1, i + n});
+          f_.insert(f_.end(), {i, i + 1, i + n, i + 1, i + n + 1, i + n});
+        }
       }
-    }
-  const auto view = [&] { return MatrixView<float>::by_rows(v.data(), v.size() / 3, 3); };
-  const std::uint32_t count = n * n / 100, side = std::uint32_t(std::sqrt(double(count)));
-  std::vector<std::uint32_t> patch, scattered;
-  for (std::uint32_t y = 0; y < side; ++y)
-    for (std::uint32_t x = 0; x < side; ++x) patch.push_back((n / 2 + y) * n + n / 3 + x);
-  for (std::uint32_t i = 0; i < count; ++i)
-    scattered.push_back(std::uint32_t((std::uint64_t(i) * 7919 * 100) % (n * n)));
-  BroadPhase<float> broad[3];
-  CandidateBuffer out;
-  for (auto& one : broad) {
-    one.build(view(), MatrixView<std::uint32_t>::by_rows(e.data(), e.size() / 2, 2),
-              MatrixView<std::uint32_t>::by_rows(f.data(), f.size() / 3, 3), 0.1F);
-    one.detect_face_vertex_candidates(out);
-    one.detect_edge_edge_candidates(out);
+    v_.push_back(0);  // readers may load four scalars
+    const std::uint32_t count = n * n / 100, side = std::uint32_t(std::sqrt(double(count)));
+    for (std::uint32_t y = 0; y < side; ++y)
+      for (std::uint32_t x = 0; x < side; ++x) patch.push_back((n / 2 + y) * n + n / 3 + x);
+    for (std::uint32_t i = 0; i < count; ++i)
+      scattered.push_back(std::uint32_t((std::uint64_t(i) * 7919 * 100) % (n * n)));
   }
-  int turn = 0;
-  const auto shift = [&](const std::vector<std::uint32_t>& vertices) {
-    for (const std::uint32_t i : vertices) v[3 * i + 2] += turn % 2 == 0 ? 0.01F : -0.01F;
-    ++turn;
+  MatrixView<float> view() const { return MatrixView<float>::by_rows(v_.data(), v_.size() / 3, 3); }
+  MatrixView<std::uint32_t> edges() const {
+    return MatrixView<std::uint32_t>::by_rows(e_.data(), e_.size() / 2, 2);
+  }
+  MatrixView<std::uint32_t> faces() const {
+    return MatrixView<std::uint32_t>::by_rows(f_.data(), f_.size() / 3, 3);
+  }
+  const float* positions() const { return v_.data(); }
+  void shift(const std::vector<std::uint32_t>& vertices) {
+    for (const std::uint32_t i : vertices) v_[3 * i + 2] += up_ ? 0.01F : -0.01F;
+    up_ = !up_;
+  }
+  Body<float> body() const {
+    Body<float> body;
+    for (std::size_t i = 0; i < f_.size(); i += 3) body.primitives.add({f_.data() + i, 3});
+    body.plans = FlightPlans<float>::handed_in(std::uint32_t(v_.size() / 3), {v_.begin(), v_.end() - 1});
+    return body;
+  }
+
+  std::vector<std::uint32_t> patch, scattered;
+
+ private:
+  std::vector<float> v_;
+  std::vector<std::uint32_t> e_, f_;
+  bool up_ = true;
+};
+
+constexpr int frames_at_once = 10;  // one is too short for the clock
+
+/// Updates of the three trees of a broad phase in which one percent of the vertices moved.
+void moved(std::uint32_t n, int repetitions, Table& table) {
+  struct Own {
+    MovingSheet sheet;
+    BroadPhase<float> broad{};
   };
-  const std::string title =
-      "1 % of " + std::to_string(n * n) + " vertices moved, all three trees made current";
-  table.compare(title,
-                {{"update(V), whole refit",
-                  [&] {
-                    shift(patch);
-                    broad[0].update(view());
-                    broad[0].refresh();
-                    return std::size_t(0);
-                  }},
-                 {"update(V, moved), one patch",
-                  [&] {
-                    shift(patch);
-                    broad[1].update(view(), patch);
-                    broad[1].refresh();
-                    return std::size_t(0);
-                  }},
-                 {"update(V, moved), scattered",
-                  [&] {
-                    shift(scattered);
-                    broad[2].update(view(), scattered);
-                    broad[2].refresh();
-                    return std::size_t(0);
-                  }}},
-                10 * repetitions);
+  std::list<Own> own;
+  CandidateBuffer out;
+  const auto contestant = [&](const char* name, auto update) -> Contestant {
+    Own& mine = own.emplace_back(MovingSheet(n));
+    mine.broad.build(mine.sheet.view(), mine.sheet.edges(), mine.sheet.faces(), 0.1F);
+    mine.broad.detect_face_vertex_candidates(out);
+    mine.broad.detect_edge_edge_candidates(out);
+    return {name, [&mine, update] {
+              for (int frame = 0; frame < frames_at_once; ++frame) {
+                update(mine);
+                mine.broad.refresh();
+              }
+              return std::size_t(0);
+            }};
+  };
+  std::vector<Contestant> contestants;
+  contestants.push_back(contestant("update(V), whole refit", [](Own& mine) {
+    mine.sheet.shift(mine.sheet.patch);
+    mine.broad.update(mine.sheet.view());
+  }));
+  contestants.push_back(contestant("update(V, moved), one patch", [](Own& mine) {
+    mine.sheet.shift(mine.sheet.patch);
+    mine.broad.update(mine.sheet.view(), mine.sheet.patch);
+  }));
+  contestants.push_back(contestant("update(V, moved), scattered", [](Own& mine) {
+    mine.sheet.shift(mine.sheet.scattered);
+    mine.broad.update(mine.sheet.view(), mine.sheet.scattered);
+  }));
+  table.compare(
+      "1 % of " + std::to_string(n * n) + " vertices moved, ten times, all three trees made current",
+      std::move(contestants), repetitions);
+}
+
+/// The same of strategies on a scene of the sheet's faces, whose positions are handed in.
+void moved_in_a_scene(std::uint32_t n, int repetitions, Table& table) {
+  struct Own {
+    MovingSheet sheet;
+    Scene<float> scene{};
+    std::optional<Session<float>> session{};
+    double t = 0;
+  };
+  std::list<Own> own;
+  const auto contestant = [&](const char* name, const char* strategy,
+                              std::vector<std::uint32_t> MovingSheet::*vertices) -> Contestant {
+    Own& mine = own.emplace_back(MovingSheet(n));
+    mine.scene.bodies.push_back(mine.sheet.body());
+    mine.scene.pairs = {{0, 0}};
+    const StrategyEntry& entry = strategy_named(strategy);
+    mine.session.emplace(mine.scene, kbvh::Contestant{&entry, {}, entry.info.topology.preferred}, Use::timed);
+    mine.session->hand_in(0, mine.sheet.positions());
+    mine.session->reset(0);
+    return {name, [&mine, vertices] {
+              PhaseTimes ignored;
+              for (int frame = 0; frame < frames_at_once; ++frame) {
+                mine.sheet.shift(mine.sheet.*vertices);
+                tell_moved<float>(mine.session->strategy(), 0, mine.sheet.*vertices);
+                mine.session->hand_in(0, mine.sheet.positions());
+                mine.session->advance(++mine.t, ignored);
+              }
+              return std::size_t(0);
+            }};
+  };
+  std::vector<Contestant> contestants;
+  contestants.push_back(contestant("bottom_up, whole refit", "bottom_up", &MovingSheet::patch));
+  contestants.push_back(contestant("dirty_refit, one patch", "dirty_refit", &MovingSheet::patch));
+  contestants.push_back(contestant("dirty_refit, scattered", "dirty_refit", &MovingSheet::scattered));
+  table.compare("1 % of " + std::to_string(n * n) + " vertices moved, ten times, strategies on the faces",
+                std::move(contestants), repetitions);
+}
+
+/// The part of a search for edge-edge candidates that the right-most leaves of subtrees save elsewhere: a
+/// tree with itself, each two subtrees once, and the same tree as two, in both orders.
+void both_orders(const FramePair& frames, int repetitions, Table& table) {
+  const Mesh<double> mesh(frames);
+  const Elements elements = make_elements(mesh.v[0].size() / 3, mesh.e, mesh.f);
+  std::vector<double> boxes;
+  for (std::size_t i = 0; i < mesh.v[0].size(); i += 3)
+    for (const bool upper : {false, true}) {
+      for (std::size_t k = i; k < i + 3; ++k)
+        boxes.push_back(upper ? std::max(mesh.v[0][k], mesh.v[1][k]) : std::min(mesh.v[0][k], mesh.v[1][k]));
+      boxes.push_back(0);
+    }
+  ElementTree<double> tree;
+  tree.start(elements.of(Element::edge), 16, active_kernel_set());
+  tree.refresh(boxes.data(), 2);
+  const WideArrays<double> nodes = tree.leaves().tree;
+  std::vector<WidePair> stack(1 << 16);
+  std::vector<LeafSlot> found(1 << 12);
+  const auto traverse = [&](WideOverlapKernels<double>::Traverse kernel) {
+    WideTraversal state{stack.data(),     1, stack.size(),     found.data(), 0,
+                        found.size() / 2, 0, ~std::uint64_t(0)};
+    stack[0] = {0, 0};
+    std::size_t leaf_pairs = 0;
+    for (; state.depth > 0; state.found = 0) {
+      kernel(nodes, nodes, state);
+      leaf_pairs += state.found;
+    }
+    return leaf_pairs;
+  };
+  const auto& kernels = wide_overlap_kernels<double>(active_kernel_set());
+  table.compare("Pairs of leaves of edges whose boxes overlap",
+                {{"each two subtrees once", [&] { return traverse(kernels.self(8)); }},
+                 {"in both orders", [&] { return traverse(kernels.traverse(8)); }}},
+                repetitions);
 }
 
 int run(int argc, char** argv) {
@@ -447,12 +385,16 @@ int run(int argc, char** argv) {
     std::printf("%s: %zu vertices, %zu edges, %zu faces\n", frames.name.c_str(),
                 frames.positions[0].size() / 3, frames.edges.size(), frames.faces.size());
     swept(frames, repetitions, table);
+    swept_by_trees(frames, repetitions, table);
     iterates(frames, repetitions, table);
     between_parts(frames, repetitions, table);
+    both_orders(frames, repetitions, table);
   } else {
     std::printf("no pair of frames in %s\n", folder.c_str());
   }
-  moved(538, repetitions, table);
+  moved(538, 3 * repetitions, table);
+  moved_in_a_scene(538, 3 * repetitions, table);
+  compare_self_intersections(repetitions, table);
 
   const std::string scratch = "kbvh::broad_phase, double, new object and buffers";
   const std::string known = "kbvh::broad_phase, double, known tree";
@@ -470,22 +412,32 @@ int run(int argc, char** argv) {
                "update(V), whole refit", 10, 40);
   table.target("update(V, moved) of 1 %, scattered, over a whole refit", "update(V, moved), scattered",
                "update(V), whole refit", 0, 0);
-  table.not_measured("swept candidates with a known tree, over a scene of features with a known tree",
-                     "a session of a scene starts over to sweep again");
-  table.not_measured("swept candidates, over boxes of CGAL and trees of Bullet and Embree",
-                     "the adapters of peers have no swept pairs");
-  table.not_measured("exact self pairs, normal cones over none", "there are no cones");
+  table.target("swept candidates with a known tree, over a scene of features with a known tree", known,
+               "bottom_up on a scene of features, known tree", 1.3, 2);
+  table.target("swept candidates from scratch, over boxes of CGAL", scratch, "CGAL's box_intersection_d", 4,
+               15);
+  const std::string tree = ", vertex-face in float, known tree";
+  table.target("swept vertex-face candidates with a known tree, over Bullet's dynamic tree",
+               "kbvh::broad_phase" + tree, "Bullet's dynamic tree" + tree, 4, 15);
+  table.target("swept vertex-face candidates with a known tree, over Embree", "kbvh::broad_phase" + tree,
+               "Embree" + tree, 4, 15);
+  table.target("dirty_refit of 1 %, one patch, over bottom_up", "dirty_refit, one patch",
+               "bottom_up, whole refit", 10, 40);
+  table.target("dirty_refit of 1 %, scattered, over bottom_up", "dirty_refit, scattered",
+               "bottom_up, whole refit", 0, 0);
+  table.target("a tree with itself, each two subtrees once, over both orders", "each two subtrees once",
+               "in both orders", 0, 0);
   table.print_targets();
   if (argc > 3) table.write(argv[3], scene, repetitions);
   return 0;
 }
 
 }  // namespace
-}  // namespace kbvh::experiments
+}  // namespace kbvh::experiments::micro
 
 int main(int argc, char** argv) {
   try {
-    return kbvh::experiments::run(argc, argv);
+    return kbvh::experiments::micro::run(argc, argv);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "kbvh_broad_phase_bench: %s\n", error.what());
     return 1;

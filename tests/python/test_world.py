@@ -218,6 +218,33 @@ class Arrays(unittest.TestCase):
             self.assertEqual(len(world.pairs()), 1)
         self.assertFalse(world.set_positions(1, kbvh.padded(triangle_at(0), "float64")))  # another precision
 
+    def test_a_strategy_is_told_what_moved(self):
+        n = 64
+        x, y = np.meshgrid(np.arange(n), np.arange(n))
+        flat = np.stack([x.ravel(), y.ravel(), np.zeros(n * n)], axis=1).astype("f4")
+        corner = (y[:-1, :-1] * n + x[:-1, :-1]).ravel()
+        faces = np.concatenate([np.stack([corner, corner + 1, corner + n], 1), np.stack([corner + n, corner + 1, corner + n + 1], 1)])
+        lid = kbvh.Body(TRIANGLE, np.array([[0, 0, 1], [n, 0, 1], [0, n, 1]], dtype="f4"), known=False)
+        found = {}
+        for strategy in ("dirty_refit", "bottom_up"):
+            sheet = flat.copy()
+            world = kbvh.World([kbvh.Body(faces, flat, known=False), lid], strategy)
+            for step, moved in enumerate(([30], [30, 200], np.array([31], dtype="u4"), [], None)):
+                sheet[list(moved) if moved is not None else slice(None), 2] += 0.75
+                world.set_positions(0, sheet, moved=moved)
+                world.advance(step + 1)
+                found.setdefault(step, []).append(sorted(map(tuple, world.pairs())))
+                if strategy == "dirty_refit" and step < 4:
+                    self.assertEqual(world.counters["partial_refits"], step + 1)
+        for step, pairs in found.items():
+            self.assertEqual(pairs[0], pairs[1], step)
+        self.assertGreater(len(found[1][0]), 0)
+        self.assertGreater(len(found[4][0]), len(found[3][0]))
+        with self.assertRaisesRegex(ValueError, "vertex 4096 moved, but body 'body' has 4096"):
+            world.set_positions(0, sheet, moved=[4096])
+        with self.assertRaisesRegex(ValueError, "the vertices that moved"):
+            world.set_positions(0, sheet, moved=[0.5])
+
     def test_the_world_keeps_what_it_reads_alive(self):
         world = self.world()
         for step in range(50):

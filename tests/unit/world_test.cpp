@@ -9,6 +9,7 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
+#include <utility>
 
 #include "core/contract/registry.hpp"
 #include "core/judge/audit.hpp"
@@ -245,6 +246,53 @@ TEST(World, PositionsFrameByFrame) {
   world.add_body("b", {triangle}, triangle_at(0));
   EXPECT_THROW(world.start("interval_join"), std::invalid_argument);
   world.start("rebuild");  // what does not suit one strategy may suit another
+}
+
+// Lists of moved vertices reach the strategy, for the next frame only; a wrong one changes nothing.
+TEST(World, PositionsOfWhichFewMoved) {
+  constexpr std::uint32_t side = 64;
+  std::vector<float> sheet;
+  std::vector<std::uint32_t> corners;
+  for (std::uint32_t j = 0; j < side; ++j)
+    for (std::uint32_t i = 0; i < side; ++i) {
+      sheet.insert(sheet.end(), {float(i), float(j), 0});
+      const std::uint32_t v = j * side + i;
+      if (i + 1 < side && j + 1 < side)
+        corners.insert(corners.end(), {v, v + 1, v + side, v + side, v + 1, v + side + 1});
+    }
+  World world;
+  const std::uint32_t body = world.add_body("sheet", {corners}, sheet);
+  world.add_body("lid", {triangle}, std::vector<double>{0},
+                 std::vector<float>{0, 0, 1, float(side), 0, 1, 0, float(side), 1});
+  world.start("dirty_refit");
+  std::vector<WorldPair> pairs;
+  std::uint64_t before = 0;
+  const auto visited = [&](double t) {
+    world.advance(t);
+    world.pairs(pairs);
+    std::uint64_t all = 0;
+    for (const WorldCounter& counter : world.counters())
+      if (counter.name == name(Counter::nodes_visited)) all = counter.value;
+    return all - std::exchange(before, all);
+  };
+  const std::uint64_t whole = visited(0.5);
+  const std::vector<std::uint32_t> moved{30}, none, wrong{30, side * side};
+  sheet[3 * 30 + 2] = 2;
+  world.set_positions(body, std::span<const float>(sheet), moved);
+  const std::uint64_t one = visited(1);
+  EXPECT_GT(one, 0u);
+  EXPECT_LT(one, whole);
+  EXPECT_GT(pairs.size(), 0u);
+  world.set_positions(body, std::span<const float>(sheet), none);
+  EXPECT_EQ(visited(2), 0u);
+  EXPECT_GT(pairs.size(), 0u);
+  // Without a list, any vertex may have moved, whatever an earlier list for the frame said.
+  sheet[3 * 30 + 2] = 0;
+  world.set_positions(body, std::span<const float>(sheet), none);
+  world.set_positions(body, std::span<const float>(sheet));
+  EXPECT_EQ(visited(3), whole);
+  EXPECT_EQ(pairs.size(), 0u);
+  EXPECT_THROW(world.set_positions(body, std::span<const float>(sheet), wrong), std::invalid_argument);
 }
 
 TEST(World, ContactsFrameByFrame) {

@@ -130,11 +130,13 @@ class PythonWorld {
   double next_knot() const { return world_.next_knot(); }
 
   /// Returns whether the array is used where it lies: one of 3n + 1 numbers in the world's precision.
-  bool set_positions(Whole body, const py::object& positions) {
+  bool set_positions(Whole body, const py::object& positions, const py::object& moved) {
     const std::string what = "the positions of body " + std::to_string(body);
     const Numbers numbers(positions, what);
     if (numbers.array().ndim() > 1) numbers.check_points(what);
-    const bool in_place = set(body, numbers) && numbers.array().is(positions);
+    std::optional<Ids> ids;
+    if (!moved.is_none()) ids.emplace(moved, "the vertices that moved");
+    const bool in_place = set(body, numbers, ids ? &*ids : nullptr) && numbers.array().is(positions);
     given_[body].pending.push_back(numbers.array());
     return in_place;
   }
@@ -313,11 +315,17 @@ class PythonWorld {
   };
 
   /// Returns whether the world reads these numbers where they lie.
-  bool set(std::uint32_t body, const Numbers& numbers) {
+  bool set(std::uint32_t body, const Numbers& numbers, const Ids* moved) {
+    const auto hand_in = [&](const auto& positions) {
+      if (moved != nullptr)
+        world_.set_positions(body, positions, moved->span());
+      else
+        world_.set_positions(body, positions);
+    };
     if (numbers.single())
-      world_.set_positions(body, numbers.floats());
+      hand_in(numbers.floats());
     else
-      world_.set_positions(body, numbers.doubles());
+      hand_in(numbers.doubles());
     return numbers.size() % 3 == 1 && numbers.single() == (precision_ == "float32");
   }
 
@@ -410,7 +418,7 @@ void bind_world(py::module_& module) {
       .def("reset", method(&PythonWorld::reset), arg("t"))
       .def("advance", method(&PythonWorld::advance), arg("t"))
       .def("next_knot", method(&PythonWorld::next_knot))
-      .def("set_positions", method(&PythonWorld::set_positions), arg("body"), arg("positions"))
+      .def("set_positions", method(&PythonWorld::set_positions), arg("body"), arg("positions"), arg("moved"))
       .def("change_plans", method(&PythonWorld::change_plans), arg("body"), arg("vertices"),
            arg("velocities"), arg("times"), arg("positions"))
       .def("change_geometry", method(&PythonWorld::change_geometry), arg("vertices"), arg("primitives"),

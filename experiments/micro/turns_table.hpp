@@ -1,0 +1,123 @@
+#pragma once
+// Times of rivals by turns, their ratios, and comparisons with targets, for programs that measure by
+// themselves.
+#include <algorithm>
+#include <cstdio>
+#include <ctime>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "core/kernels/kernel_set.hpp"
+#include "experiments/common/environment.hpp"
+#include "experiments/common/machine.hpp"
+
+namespace kbvh::experiments::micro {
+
+/// The processor's time of this program, which has one thread: other programs disturb it least.
+inline double milliseconds() {
+  return 1e3 * double(std::clock()) / CLOCKS_PER_SEC;
+}
+
+/// Work that is timed by turns with its rivals.
+struct Contestant {
+  std::string name;
+  std::function<std::size_t()> work;  ///< returns the number of pairs
+  std::vector<double> ms{};
+  std::size_t pairs = 0;
+};
+
+/// What was compared in this run, for the file and for targets.
+class Table {
+ public:
+  /// Plays all contestants once without a clock, then by turns, and prints medians and how many times as long
+  /// as the first each one takes.
+  void compare(const std::string& title, std::vector<Contestant> contestants, int repetitions) {
+    for (int r = -1; r < repetitions; ++r)
+      for (Contestant& contestant : contestants) {
+        const double begin = milliseconds();
+        contestant.pairs = contestant.work();
+        const double took = milliseconds() - begin;
+        if (r >= 0) contestant.ms.push_back(took);
+      }
+    std::printf("%s\n", title.c_str());
+    nlohmann::json rows = nlohmann::json::array();
+    double first = 0;
+    for (Contestant& contestant : contestants) {
+      std::sort(contestant.ms.begin(), contestant.ms.end());
+      const double median = contestant.ms[contestant.ms.size() / 2];
+      if (first == 0) first = median;
+      medians_[contestant.name] = median;
+      std::printf("  %-56s %10.3f ms  %7.2f x  %zu pairs\n", contestant.name.c_str(), median, median / first,
+                  contestant.pairs);
+      rows.push_back({{"name", contestant.name},
+                      {"median_ms", median},
+                      {"ms", contestant.ms},
+                      {"over_first", median / first},
+                      {"pairs", contestant.pairs}});
+    }
+    comparisons_.push_back({{"title", title}, {"contestants", rows}});
+  }
+
+  /// Compares how many times as long as `ours` the rival takes with what is at least asked for, and with the
+  /// aim; 0: none is. Does nothing if one of them was not measured.
+  void target(const char* what, const std::string& ours, const std::string& rival, double at_least,
+              double aim) {
+    if (!medians_.contains(ours) || !medians_.contains(rival)) return;
+    const double ratio = medians_.at(rival) / medians_.at(ours);
+    const char* const verdict = at_least == 0      ? "reported"
+                                : ratio < at_least ? "missed"
+                                : ratio < aim      ? "met"
+                                                   : "met, and the aim";
+    targets_.push_back({{"what", what},
+                        {"ours", ours},
+                        {"rival", rival},
+                        {"ratio", ratio},
+                        {"at_least", at_least},
+                        {"aim", aim},
+                        {"verdict", verdict}});
+  }
+  void not_measured(const char* what, const char* why) {
+    targets_.push_back({{"what", what}, {"ratio", nullptr}, {"verdict", "not measured"}, {"why", why}});
+  }
+
+  void print_targets() const {
+    std::printf("Targets\n");
+    for (const nlohmann::json& target : targets_) {
+      const std::string what = target["what"], verdict = target["verdict"];
+      if (target["ratio"].is_null())
+        std::printf("  %-78s %s: %s\n", what.c_str(), verdict.c_str(),
+                    target["why"].get<std::string>().c_str());
+      else
+        std::printf("  %-78s %7.2f x  (%g, aim %g): %s\n", what.c_str(), target["ratio"].get<double>(),
+                    target["at_least"].get<double>(), target["aim"].get<double>(), verdict.c_str());
+    }
+  }
+  void write(const std::filesystem::path& file, const std::string& frames, int repetitions) const {
+    const nlohmann::json result{{"program", "kbvh_broad_phase_bench"},
+                                {"time", now_utc()},
+                                {"commit", commit()},
+                                {"dirty", dirty()},
+                                {"machine", machine()},
+                                {"kernels", name(active_kernel_set())},
+                                {"frames", frames},
+                                {"repetitions", repetitions},
+                                {"clock", "processor time, median of repetitions by turns, one thread"},
+                                {"comparisons", comparisons_},
+                                {"targets", targets_}};
+    std::ofstream out(file);
+    out << result.dump(2) << '\n';
+    if (!out.flush()) throw std::runtime_error("cannot write " + file.string());
+  }
+
+ private:
+  std::map<std::string, double> medians_;
+  nlohmann::json comparisons_ = nlohmann::json::array(), targets_ = nlohmann::json::array();
+};
+
+}  // namespace kbvh::experiments::micro
