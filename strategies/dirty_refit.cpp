@@ -5,7 +5,8 @@
 //
 // When it wins: where few vertices of a large body move, and these lie together. A node of an 8-wide tree is
 // refitted with all of its leaves, up to 128 primitives, so that one percent of the vertices, scattered over
-// the body, touches most nodes.
+// the body, touches most nodes. On a sheet of 289,444 vertices, with lists from the caller, updates were 12
+// times as fast as `bottom_up` where one percent moved in one patch, and 0.74 times where it was scattered.
 
 #include "core/contract/registry.hpp"
 #include "core/contract/takes_moved_vertices.hpp"

@@ -235,7 +235,7 @@ class Arrays(unittest.TestCase):
                 world.advance(step + 1)
                 found.setdefault(step, []).append(sorted(map(tuple, world.pairs())))
                 if strategy == "dirty_refit" and step < 4:
-                    self.assertEqual(world.counters["partial_refits"], step + 1)
+                    self.assertEqual(world.counters()["partial_refits"], step + 1)
         for step, pairs in found.items():
             self.assertEqual(pairs[0], pairs[1], step)
         self.assertGreater(len(found[1][0]), 0)
