@@ -320,12 +320,13 @@ TEST(ChoicePolicy, AJoinThatCostsMoreThanARefitIsLeftForAWhile) {
 TEST(ChoicePolicy, TriesALoserEverMoreSeldom) {
   Steady steady(1);
   steady.offers[1] = {.expected = 90, .hoped = 50};
+  steady.offers[2] = {.expected = 1e9, .hoped = 1e9};
   int last = 0;
   std::vector<int> waits;
   for (int frame = 1; frame <= 4000; ++frame) {
-    const int before = steady.answered[1];
+    const int before = steady.answered[1] + steady.stops;
     steady.play(1, 100, 130, 1e9, 1e9);
-    if (steady.answered[1] == before) continue;
+    if (steady.answered[1] + steady.stops == before) continue;
     waits.push_back(frame - last);
     last = frame;
   }

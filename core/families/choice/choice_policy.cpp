@@ -33,8 +33,10 @@ double ChoicePolicy::estimate(std::size_t candidate) const {
 
 /// Returns how much of what was observed has changed since a candidate's work was counted.
 double ChoicePolicy::age(const Candidate& candidate) const {
-  const double ratio = contacts_ / candidate.contacts;
-  return changes_ - candidate.changes + std::max(ratio, 1 / ratio) - 1;
+  const double ratio = contacts_ / candidate.contacts, of_contacts = std::max(ratio, 1 / ratio) - 1;
+  // Trials that were lost with a quarter of the contacts, or four times as many, do not count.
+  const int lost = of_contacts > 3 ? 0 : candidate.lost;
+  return of_contacts + std::ldexp(changes_ - candidate.changes, -lost);
 }
 
 double ChoicePolicy::charge() const {
@@ -119,9 +121,9 @@ void ChoicePolicy::begin(std::size_t candidate, ChoiceState state) {
   limit_ = unlimited;
   if (state == ChoiceState::tries) {
     allowance_ = allowance(candidate);
-    // More than a refit would take is not worth its work.
+    // More than a refit would take is not worth its work, but a stopped frame has to be answered again.
     limit_ = settings_.budget * all_work_ - paid_ + allowance_;
-    if (candidate != refit) limit_ = std::min(limit_, left_ * estimate(refit));
+    if (candidate != refit) limit_ = std::min(limit_, (left_ + 1) * estimate(refit));
     stay_ = estimate(incumbent_);
     candidates_[candidate].regret = 0;
   } else if (candidate != refit && left_ > 1) {
@@ -178,7 +180,7 @@ std::size_t ChoicePolicy::challenger() {
     const Offer& offer = offers_[i];
     if (i == incumbent_ || offer.frames == 0) continue;
     const double expected = one.known ? estimate(i) : offer.expected;
-    const double hoped = one.known ? expected / (1 + std::ldexp(age(one), -one.lost)) : offer.hoped;
+    const double hoped = one.known ? expected / (1 + age(one)) : offer.hoped;
     if (!(hoped < stay / settings_.gain)) continue;
     one.regret += (stay - hoped) * answered_;
     const double cost = offer.change + offers_[incumbent_].change + (expected - stay) * offer.frames;
