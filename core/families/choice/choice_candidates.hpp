@@ -31,8 +31,8 @@ struct ChoicePrices {
   static constexpr double span_test = 45;   ///< two triangles decided for a span of time
   static constexpr double frame_test = 60;  ///< two triangles of a join at one frame: six positions are made
   static constexpr double fetch = 3.3;      ///< one of these positions
-  /// Starting a candidate, per primitive: its hierarchy comes from memory, about 500 bytes at 25 GB/s.
-  static constexpr double start = 20;
+  /// Starting a candidate, per primitive: its hierarchy comes from memory, about 250 bytes at 25 GB/s.
+  static constexpr double start = 10;
 };
 
 /// A candidate of the strategy `auto`: what it is, what its work costs in nanoseconds, and its work per frame

@@ -10,7 +10,7 @@ constexpr double unlimited = std::numeric_limits<double>::infinity();
 constexpr double frame_ages = 1.0 / 64;  ///< change of what is observed that a frame counts as
 constexpr double recent = 0.25;          ///< age up to which an estimate needs no trial
 constexpr double few_contacts = 16;      ///< below this many, changes of contacts count less
-constexpr int lasts = 16;                ///< frames that a choice usually lasts, at least
+constexpr int lasts = 32;                ///< frames that a choice usually lasts, at least
 }  // namespace
 
 void ChoicePolicy::start_over() {
@@ -33,10 +33,16 @@ double ChoicePolicy::estimate(std::size_t candidate) const {
 
 /// Returns how much of what was observed has changed since a candidate's work was counted.
 double ChoicePolicy::age(const Candidate& candidate) const {
-  const double ratio = contacts_ / candidate.contacts, of_contacts = std::max(ratio, 1 / ratio) - 1;
+  const double ratio = contacts_ / candidate.contacts;
+  return changes_ - candidate.changes + std::max(ratio, 1 / ratio) - 1;
+}
+/// Returns the work of a known candidate at best: less after each change, unless it has lost trials since.
+double ChoicePolicy::hoped(std::size_t candidate) const {
+  const Candidate& one = candidates_[candidate];
+  const double of_contacts = age(one) - (changes_ - one.changes);
   // Trials that were lost with a quarter of the contacts, or four times as many, do not count.
-  const int lost = of_contacts > 3 ? 0 : candidate.lost;
-  return of_contacts + std::ldexp(changes_ - candidate.changes, -lost);
+  const int lost = of_contacts > 3 ? 0 : one.lost;
+  return estimate(candidate) / (1 + of_contacts + std::ldexp(changes_ - one.changes, -lost));
 }
 
 double ChoicePolicy::charge() const {
@@ -180,7 +186,7 @@ std::size_t ChoicePolicy::challenger() {
     const Offer& offer = offers_[i];
     if (i == incumbent_ || offer.frames == 0) continue;
     const double expected = one.known ? estimate(i) : offer.expected;
-    const double hoped = one.known ? expected / (1 + age(one)) : offer.hoped;
+    const double hoped = one.known ? this->hoped(i) : offer.hoped;
     if (!(hoped < stay / settings_.gain)) continue;
     one.regret += (stay - hoped) * answered_;
     const double cost = offer.change + offers_[incumbent_].change + (expected - stay) * offer.frames;

@@ -110,6 +110,7 @@ class ChoicePolicy {
   double allowance(std::size_t candidate) const;
   double charge() const;
   double age(const Candidate& candidate) const;
+  double hoped(std::size_t candidate) const;
 
   Settings settings_;
   std::vector<Candidate> candidates_;
