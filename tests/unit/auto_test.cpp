@@ -218,7 +218,9 @@ TEST(Auto, ChoosesTheSameWhereItIsTimed) {
     EXPECT_EQ(choices[0], choices[1]);
     EXPECT_GT(frames_in_new_trees(choices[0]), 0) << choices[0];
     // With three frames per segment, a join reaches the refit's work for them, and is given up.
-    if (l == 10) EXPECT_NE(choices[0].find("interval_join"), std::string::npos) << choices[0];
+    if (l == 10) {
+      EXPECT_NE(choices[0].find("interval_join"), std::string::npos) << choices[0];
+    }
   }
 }
 

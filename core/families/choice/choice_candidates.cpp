@@ -9,11 +9,13 @@ namespace {
 
 using Prediction = ChoiceCandidate::Prediction;
 
-/// The same trees without slabs: a fifth of the box tests was made with slabs, which usually leave out half
-/// of the candidates, and sometimes none.
+/// The same trees without slabs: usually a fifth of the box tests was made with slabs, which left out half of
+/// the candidates; at best half of the tests, which left out none.
 Prediction boxes(const Observed& seen, const ChoiceCandidate& own) {
-  const double hoped = own.update(seen) + own.box_test * 0.8 * seen.box_tests + own.pair * seen.pairs;
-  return {hoped + own.pair * seen.pairs, hoped};
+  const auto work = [&](double tests, double pairs) {
+    return own.update(seen) + own.box_test * tests * seen.box_tests + own.pair * pairs * seen.pairs;
+  };
+  return {work(0.8, 2), work(0.5, 1)};
 }
 /// New trees: boxes of the surfaces at the start, in a tree that is a little worse than that of the start.
 /// The probability that two boxes meet grows with the volume of their sum.
