@@ -98,7 +98,8 @@ void ChoicePolicy::transition(Event event) {
       // The search of a segment serves all its frames, also those before the candidate began.
       learn(unit_work_ / std::max(offers_[active_].whole, answered_), offers_[active_].fixed);
       if (state_ != ChoiceState::tries) break;
-      if (estimate(active_) * settings_.gain < stay_) {
+      // The change is made already, so it need not be worth another one.
+      if (estimate(active_) < stay_) {
         incumbent_ = active_;
         active.lost = 0;
       } else {

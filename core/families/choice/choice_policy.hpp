@@ -52,7 +52,7 @@ enum class ChoiceState : std::uint8_t {
 class ChoicePolicy {
  public:
   struct Settings {
-    double gain = 1.1;     ///< estimated speed-up from which on another candidate becomes the incumbent
+    double gain = 1.1;     ///< estimated speed-up from which on another candidate is worth a change
     double budget = 0.05;  ///< charges of trials, as a share of all work
   };
   static constexpr std::size_t refit = 0;

@@ -64,13 +64,13 @@ class OneOfMany : public Strategy<S>, public AnswersChanges<S>, public TakesPlan
     body_changed_.assign(this->scene_.body_count(), 0);
     changes_of_many_.start_over();
     frame_ = changed_at_ = 0;
-    asked_for_changes_ = false;
     active_ = 0;
     start(t);
   }
   /// Makes an instance answer the next frame, at t.
   void answer_by(std::size_t instance, double t) {
     const bool advances = goes_on(instance);
+    if (instance != active_) changes_of_many_.switched();
     active_ = instance;
     ++frame_;
     ++active().frames;
@@ -85,12 +85,10 @@ class OneOfMany : public Strategy<S>, public AnswersChanges<S>, public TakesPlan
     active().last = --frame_;
   }
   /// Whether an instance that answers the next frame goes on from where it was: the active one, and another
-  /// after few frames without changes of plans. Where changes are asked for, the other would report those
-  /// since its own last answer, so it starts again.
+  /// after few frames without changes of plans.
   bool goes_on(std::size_t instance) const {
     const Instance& one = instances_[instance];
-    return instance == active_ ||
-           (one.started && frame_ - one.last < few_frames && changed_at_ <= one.last && !asked_for_changes_);
+    return instance == active_ || (one.started && frame_ - one.last < few_frames && changed_at_ <= one.last);
   }
   /// Returns the pairs of the last answer as changes.
   const PairSet& pairs_of_changes(Answer answer) const { return changes_of_many_.pairs(answer); }
@@ -98,7 +96,6 @@ class OneOfMany : public Strategy<S>, public AnswersChanges<S>, public TakesPlan
 
   void confirm_candidates(double t, PairBuffer& pairs) override { active().strategy->confirm(t, pairs); }
   void find_changes(double t, Answer answer, PairBuffer& begun, PairBuffer& ended) override {
-    asked_for_changes_ = true;
     changes_of_many_.find(*active().strategy, t, answer, begun, ended);
   }
   void follow_plans(double t, std::span<const PlanChange<S>> changes) override {
@@ -145,8 +142,7 @@ class OneOfMany : public Strategy<S>, public AnswersChanges<S>, public TakesPlan
 
   std::size_t active_ = 0;
   int frame_ = 0, changed_at_ = 0;  ///< frames since `reset`; the last one with changes of plans
-  bool asked_for_changes_ = false;
-  Counters retired_;  ///< counts of instances before their restart
+  Counters retired_;                ///< counts of instances before their restart
   std::uint64_t first_fetch_ = 0;
   std::vector<PlanChange<S>> changed_;  ///< the first change of each body since `reset`
   std::vector<std::uint8_t> body_changed_;
