@@ -7,10 +7,10 @@ namespace kbvh {
 
 namespace {
 constexpr double unlimited = std::numeric_limits<double>::infinity();
-constexpr double frame_ages = 1.0 / 64;  ///< change of what is observed that a frame counts as
-constexpr double recent = 0.25;          ///< age up to which an estimate needs no trial
-constexpr double few_contacts = 16;      ///< below this many, changes of contacts count less
-constexpr int lasts = 32;                ///< frames that a choice usually lasts, at least
+constexpr double frame_ages = 1.0 / 256;  ///< change of what is observed that a frame counts as
+constexpr double recent = 0.25;           ///< age up to which an estimate needs no trial
+constexpr double few_contacts = 16;       ///< below this many, changes of contacts count less
+constexpr int lasts = 32;                 ///< frames that a choice usually lasts, at least
 }  // namespace
 
 void ChoicePolicy::start_over() {
