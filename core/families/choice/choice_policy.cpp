@@ -36,13 +36,15 @@ double ChoicePolicy::age(const Candidate& candidate) const {
   const double ratio = contacts_ / candidate.contacts;
   return changes_ - candidate.changes + std::max(ratio, 1 / ratio) - 1;
 }
-/// Returns the work of a known candidate at best: less after each change, unless it has lost trials since.
+/// Returns the work of a known candidate at best: contacts have not made it more, and other changes have made
+/// it less, unless it has lost trials since.
 double ChoicePolicy::hoped(std::size_t candidate) const {
   const Candidate& one = candidates_[candidate];
-  const double of_contacts = age(one) - (changes_ - one.changes);
+  const double ratio = contacts_ / one.contacts;
   // Trials that were lost with a quarter of the contacts, or four times as many, do not count.
-  const int lost = of_contacts > 3 ? 0 : one.lost;
-  return estimate(candidate) / (1 + of_contacts + std::ldexp(changes_ - one.changes, -lost));
+  const int lost = std::max(ratio, 1 / ratio) > 4 ? 0 : one.lost;
+  return std::min(estimate(candidate), one.fixed + one.varying) /
+         (1 + std::ldexp(changes_ - one.changes, -lost));
 }
 
 double ChoicePolicy::charge() const {
