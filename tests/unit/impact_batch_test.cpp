@@ -384,7 +384,7 @@ TEST(ImpactBatch, WhatIsApartComesNotNear) {
         const ImpactBatch::Mask found = batch.apart_until(until, separation);
         if (set == KernelSet::portable) expected = found;
         ASSERT_EQ(found, expected) << name(set) << ", " << family.name;
-        // Without a separation, more is apart.
+        // Elements that are apart by more are apart by less.
         EXPECT_EQ(batch.apart_until(until, 1.25 * separation) & ~found, 0u);
       }
       for (std::size_t i = 0; i < queries.size(); ++i) {
