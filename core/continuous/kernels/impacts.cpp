@@ -336,12 +336,12 @@ KBVH_INLINE Decided decide_lanes(const ImpactBlock& block, std::size_t i, const 
   for (Lanes& f : cubic.f) f = __builtin_bit_cast(Lanes, bits<double>(f) ^ turned);
   const Lanes(&f)[4] = cubic.f;
   Mask free = exceeds(smaller(smaller(f[0], f[1]), smaller(f[2], f[3])), bound);
-  if (bits_of(free) == all_lanes) return {all_lanes, 0, {}};
+  if (bits_of(free) == all_lanes) return {all_lanes, 0, Lanes{}};
 
   // One change of sign: f[1] is not negative, or f[2] not positive.
   const Mask once = exceeds(f[0], bound) & exceeds(-bound, f[3]) &
                     (exceeds(f[1], bound) | exceeds(-bound, f[2]));
-  Interval interval{{}, lanes_of(1)};
+  Interval interval{Lanes{}, lanes_of(1)};
   Mask isolated{};
   if (bits_of(once) != 0) {
     Lanes k = cubic.cell_of_root(once);
