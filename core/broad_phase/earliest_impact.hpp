@@ -30,9 +30,9 @@ struct EarliestImpactStats {
 
 /// Takes the earlier of `earliest` and the first times at which candidates, face_vertex or edge_edge, are
 /// within the separation: exact verdicts of find_impact for a separation of 0, else of find_approach.
-/// Candidates are filtered in batches (core/continuous/impact_batch.hpp). Points are [vertex][4], at t = 0 and
-/// t = 1. The result does not depend on the order of candidates. Candidates within one of the `patches` are
-/// skipped; these must be certified for the motion, and the separation 0.
+/// Candidates are filtered in batches (core/continuous/impact_batch.hpp). Points are [vertex][4], at t = 0
+/// and t = 1. The result does not depend on the order of candidates. Candidates within one of the `patches`
+/// are skipped; these must be certified for the motion, and the separation 0.
 template <class S>
 void take_earlier_impacts(CandidateKind kind, const Elements& elements, const S* begin, const S* end,
                           std::span<const Candidate> candidates, double separation, EarliestImpact& earliest,

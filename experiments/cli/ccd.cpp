@@ -72,7 +72,8 @@ class ExactTest {
     std::size_t first = 0;
     const auto decide = [&](ImpactBatch& batch) {
       batch.decide(&stats_);
-      for (std::size_t i = 0; i < batch.size(); ++i) take(queries.queries[first + i], batch.impact(i).touches);
+      for (std::size_t i = 0; i < batch.size(); ++i)
+        take(queries.queries[first + i], batch.impact(i).touches);
       first += batch.size();
       batch.clear();
     };

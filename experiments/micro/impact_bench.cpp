@@ -1,7 +1,7 @@
-// Impacts per second: in batches, one by one, and by the continuous tests of peers, in one run and by turns, on
-// pairs between two real frames: those with known verdicts, and all candidates of kbvh::broad_phase. Prints
-// medians of processor time as queries per second and ratios, and compares them with targets; FILE receives
-// all times, ratios and targets. Exit code 1: batches and single tests differ.
+// Impacts per second: in batches, one by one, and by the continuous tests of peers, in one run and by turns,
+// on pairs between two real frames: those with known verdicts, and all candidates of kbvh::broad_phase.
+// Prints medians of processor time as queries per second and ratios, and compares them with targets; FILE
+// receives all times, ratios and targets. Exit code 1: batches and single tests differ.
 //   kbvh_impact_bench [FRAMES] [REPETITIONS] [FILE]
 // FRAMES is a folder with a pair of frames, or one of such folders (default: ccd/frames of the data folder).
 #include <algorithm>
@@ -149,10 +149,8 @@ class Bench {
                       {"queries_per_second", contestant.per_second},
                       {"touching", contestant.found.touching}});
     }
-    comparisons_.push_back({{"pairs", pairs.name},
-                            {"queries", pairs.ids.size()},
-                            {"exact", exact},
-                            {"contestants", rows}});
+    comparisons_.push_back(
+        {{"pairs", pairs.name}, {"queries", pairs.ids.size()}, {"exact", exact}, {"contestants", rows}});
     for (std::size_t i = 1; i < contestants.size(); ++i)
       target(pairs.name + ": batches over " + contestants[i].name,
              contestants[0].per_second / contestants[i].per_second, i == 1 ? 0 : 0.5, i == 1 ? 0 : 1.5);
@@ -162,8 +160,8 @@ class Bench {
     std::printf("Targets\n");
     for (const nlohmann::json& target : targets_)
       std::printf("  %-70s %7.2f x  (%g, aim %g): %s\n", target["what"].get<std::string>().c_str(),
-                  target["ratio"].get<double>(), target["at_least"].get<double>(), target["aim"].get<double>(),
-                  target["verdict"].get<std::string>().c_str());
+                  target["ratio"].get<double>(), target["at_least"].get<double>(),
+                  target["aim"].get<double>(), target["verdict"].get<std::string>().c_str());
     if (peers_.empty()) std::printf("  no peer with a continuous test of its own is built in\n");
   }
   void write(const fs::path& file) const {

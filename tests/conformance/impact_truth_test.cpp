@@ -70,10 +70,10 @@ TEST(ImpactTruth, BatchesDecideAsSingleTests) {
         batch.decide(&stats);
         for (std::size_t k = 0; k < batch.size(); ++k) {
           const Impact &found = batch.impact(k), &expected = single[first + k];
-          differing += found.touches != expected.touches || found.begin != expected.begin ||
-                               found.end != expected.end
-                           ? 1
-                           : 0;
+          differing +=
+              found.touches != expected.touches || found.begin != expected.begin || found.end != expected.end
+                  ? 1
+                  : 0;
         }
         first = i + 1;
         batch.clear();
@@ -84,7 +84,8 @@ TEST(ImpactTruth, BatchesDecideAsSingleTests) {
       exact.push_back(stats.exact);
       filtered += set == KernelSet::portable ? stats.filtered : 0;
     }
-    EXPECT_EQ(std::adjacent_find(exact.begin(), exact.end(), std::not_equal_to<>()), exact.end()) << file.name;
+    EXPECT_EQ(std::adjacent_find(exact.begin(), exact.end(), std::not_equal_to<>()), exact.end())
+        << file.name;
   }
   EXPECT_GT(queries, 100000u);
   EXPECT_GT(filtered, queries / 2);

@@ -1,5 +1,5 @@
-// Impacts in batches against single tests and against exact arithmetic, with every kernel set: next to contact,
-// exactly on borders, grazing, degenerate, far from the origin. KBVH_SLOW=1 takes a million queries.
+// Impacts in batches against single tests and against exact arithmetic, with every kernel set: next to
+// contact, exactly on borders, grazing, degenerate, far from the origin. KBVH_SLOW=1 takes a million queries.
 #include "core/continuous/impact_batch.hpp"
 
 #include <gtest/gtest.h>
@@ -240,7 +240,8 @@ Tally check(const std::vector<Query>& queries, KernelSet set, const std::vector<
     for (std::size_t i = 0; i < count; ++i) batch.add(queries[first + i].moving());
     EXPECT_EQ(batch.size(), count);
     // The filter alone, on some of them: what it proves is what exact arithmetic says, to the last bit.
-    const ImpactBatch::Mask which = batch.all() & (round % 3 == 0 ? ~ImpactBatch::Mask(0) : 0x5f3759df96a5c3e7u);
+    const ImpactBatch::Mask which =
+        batch.all() & (round % 3 == 0 ? ~ImpactBatch::Mask(0) : 0x5f3759df96a5c3e7u);
     const ImpactBatch::Mask decided = batch.filter(which);
     EXPECT_EQ(decided & ~which, 0u);
     for (std::size_t i = 0; i < count; ++i) {
@@ -280,9 +281,12 @@ void check_family(const Family& family, Kind kind, std::uint64_t seed, std::size
   // Each family has both answers.
   EXPECT_GT(expected.touching, count / 50) << family.name;
   EXPECT_GT(expected.free, count / 50) << family.name;
+  // Most of those next to contact are on a border.
   const std::string what = family.name;
-  if (what == "general" || what == "far away" || what == "unrelated") {
-    EXPECT_GT(expected.by_filter, count / 2) << what;
+  if (what == "unrelated") {
+    EXPECT_GT(expected.by_filter, count / 2);
+  } else if (what == "general" || what == "far away") {
+    EXPECT_GT(expected.by_filter, count / 4) << what;
   }
 }
 
@@ -323,38 +327,51 @@ TEST(ImpactBatch, AllAndPartsOfABatch) {
 
 // ---- Seeded faults ----------------------------------------------------------------------------------------
 
+struct Judged {
+  Query query;
+  bool touches;
+};
+
 /// Counts the queries that the filter decides wrongly if its error bounds are these.
-std::size_t wrong_verdicts(const ImpactErrors& errors, KernelSet set) {
+std::size_t wrong_verdicts(const std::vector<Judged>& queries, const ImpactErrors& errors, KernelSet set) {
   std::size_t wrong = 0;
-  for (const Family& family : families)
-    for (const Kind kind : {Kind::vertex_face, Kind::edge_edge}) {
-      Random random(5);
-      ImpactBatch batch(kind, set, errors);
-      for (int round = 0; round < 20; ++round) {
-        std::vector<bool> truth;
-        while (!batch.full()) {
-          const Query query = family.make(random, kind);
-          batch.add(query.moving());
-          truth.push_back(find_impact(kind, query.moving()).touches);
-        }
-        const ImpactBatch::Mask decided = batch.filter(batch.all());
-        for (std::size_t i = 0; i < batch.size(); ++i)
-          if ((decided >> i & 1) != 0 && batch.impact(i).touches != truth[i]) ++wrong;
-        batch.clear();
-      }
+  for (const Kind kind : {Kind::vertex_face, Kind::edge_edge}) {
+    ImpactBatch batch(kind, set, errors);
+    std::vector<bool> truth;
+    const auto compare = [&] {
+      const ImpactBatch::Mask decided = batch.filter(batch.all());
+      for (std::size_t i = 0; i < batch.size(); ++i)
+        if ((decided >> i & 1) != 0 && batch.impact(i).touches != truth[i]) ++wrong;
+      batch.clear();
+      truth.clear();
+    };
+    for (const Judged& judged : queries) {
+      if (judged.query.kind != kind) continue;
+      batch.add(judged.query.moving());
+      truth.push_back(judged.touches);
+      if (batch.full()) compare();
     }
+    compare();
+  }
   return wrong;
 }
 
 TEST(ImpactBatch, BoundsThatAreTooSmallAreCaught) {
+  std::vector<Judged> queries;
+  Random random(5);
+  for (const Family& family : families)
+    for (int i = 0; i < 1000; ++i) {
+      const Query query = family.make(random, i % 2 == 0 ? Kind::vertex_face : Kind::edge_edge);
+      queries.push_back({query, find_impact(query.kind, query.moving()).touches});
+    }
   for (const KernelSet set : supported_kernel_sets()) {
-    EXPECT_EQ(wrong_verdicts(impact_errors, set), 0u) << name(set);
+    EXPECT_EQ(wrong_verdicts(queries, impact_errors, set), 0u) << name(set);
     ImpactErrors errors = impact_errors;
     errors.cubic = errors.least_cubic = 0;
-    EXPECT_GT(wrong_verdicts(errors, set), 0u) << name(set);
+    EXPECT_GT(wrong_verdicts(queries, errors, set), 0u) << name(set);
     errors = impact_errors;
     errors.quadratic = errors.least_quadratic = 0;
-    EXPECT_GT(wrong_verdicts(errors, set), 0u) << name(set);
+    EXPECT_GT(wrong_verdicts(queries, errors, set), 0u) << name(set);
   }
 }
 
@@ -363,7 +380,7 @@ TEST(ImpactBatch, BoundsThatAreTooSmallAreCaught) {
 TEST(ImpactBatch, WhatIsApartComesNotNear) {
   Random random(7);
   std::size_t apart = 0, far = 0;
-  for (int round = 0; round < 40; ++round)
+  for (int round = 0; round < 8; ++round)
     for (const Kind kind : {Kind::vertex_face, Kind::edge_edge}) {
       const Family& family = families[std::size_t(round) % std::size(families)];
       const double until = round % 5 == 0 ? 1 : 0.5 + 0.5 * random.unit();
@@ -396,7 +413,7 @@ TEST(ImpactBatch, WhatIsApartComesNotNear) {
         EXPECT_TRUE(!near.touches || near.end > until) << family.name << queries[i].text();
       }
     }
-  EXPECT_GT(far, 1000u);
+  EXPECT_GT(far, 200u);
   EXPECT_GT(apart, far / 2);
 }
 
@@ -415,7 +432,8 @@ TEST(ImpactBatch, ADistanceThatIsReachedIsNotApart) {
         while (!batch.full()) {
           Query query;
           const auto in_plane = [&] {
-            const double along = double(random.below(1u << 28)) - 0x1p27, up = double(random.below(1u << 30)) - 0x1p29;
+            const double along = double(random.below(1u << 28)) - 0x1p27,
+                         up = double(random.below(1u << 30)) - 0x1p29;
             return Point{-4 * along, 3 * along, up};
           };
           for (std::size_t i = 1; i < 4; ++i) query.begin[i] = in_plane();

@@ -126,11 +126,11 @@ KBVH_INLINE Mask boxes_apart(const ImpactBlock& block, std::size_t i, double unt
 /// separation |w| for these, at 0 and at `until`. Tries the sum of all differences and the normal n half-way,
 /// as they are computed: any w proves it.
 ///
-/// Errors. Let D be the largest magnitudes of computed differences along each axis. A difference is wrong by u
-/// D at t = 0 and by 4.01 u D at `until`; the scalar product has three roundings of its own: together w . d is
-/// wrong by at most 7.1 u times the sum of |w| D over the axes, which is computed with an error of 3 u.
-/// `gap` is 16 u. Powers of two stand for underflow. The last comparison is of squares, with 32 u for its nine
-/// roundings; a separation times w that underflows is less than 2^-500.
+/// Errors. Let D be the largest magnitudes of computed differences along each axis. A difference is wrong by
+/// u D at t = 0 and by 4.01 u D at `until`; the scalar product has three roundings of its own: together w . d
+/// is wrong by at most 7.1 u times the sum of |w| D over the axes, which is computed with an error of 3 u.
+/// `gap` is 16 u. Powers of two stand for underflow. The last comparison is of squares, with 32 u for its
+/// nine roundings; a separation times w that underflows is less than 2^-500.
 template <std::size_t split>
 KBVH_INLINE Mask planes_apart(const ImpactBlock& block, std::size_t i, double until, double separation,
                               const ImpactErrors& errors) {
@@ -257,9 +257,9 @@ struct Cubic {
     const Lanes f01 = between(f[0], f[1], t), f12 = between(f[1], f[2], t), f23 = between(f[2], f[3], t);
     return between(between(f01, f12, t), between(f12, f23, t), t);
   }
-  /// Returns k of the cell [k, k + 1] / 2^20 that contains the root, approximately, of a cubic that falls from
-  /// f[0] > 0 to f[3] < 0: Newton's method, or a bisection where a step leaves the bracket. A lane that has
-  /// converged stays, so that no lane depends on its neighbours.
+  /// Returns k of the cell [k, k + 1] / 2^20 that contains the root, approximately, of a cubic that falls
+  /// from f[0] > 0 to f[3] < 0: Newton's method, or a bisection where a step leaves the bracket. A lane that
+  /// has converged stays, so that no lane depends on its neighbours.
   KBVH_INLINE Lanes cell_of_root(Mask active) const {
     const Lanes c1 = 3 * (f[1] - f[0]), c2 = 3 * (f[2] - 2 * f[1] + f[0]);
     const Lanes c3 = f[3] - 3 * f[2] + 3 * f[1] - f[0];
@@ -281,9 +281,7 @@ struct Cubic {
     constexpr double shift = 0x1.8p52;
     return clamped((t * cells - 0.5 + shift) - shift);
   }
-  KBVH_INLINE static Lanes clamped(Lanes k) {
-    return larger(smaller(k, lanes_of(cells - 1)), Lanes{});
-  }
+  KBVH_INLINE static Lanes clamped(Lanes k) { return larger(smaller(k, lanes_of(cells - 1)), Lanes{}); }
 };
 
 /// The signs of n and its shares along one axis, in an interval.
@@ -339,8 +337,8 @@ KBVH_INLINE Decided decide_lanes(const ImpactBlock& block, std::size_t i, const 
   if (bits_of(free) == all_lanes) return {all_lanes, 0, Lanes{}};
 
   // One change of sign: f[1] is not negative, or f[2] not positive.
-  const Mask once = exceeds(f[0], bound) & exceeds(-bound, f[3]) &
-                    (exceeds(f[1], bound) | exceeds(-bound, f[2]));
+  const Mask once =
+      exceeds(f[0], bound) & exceeds(-bound, f[3]) & (exceeds(f[1], bound) | exceeds(-bound, f[2]));
   Interval interval{Lanes{}, lanes_of(1)};
   Mask isolated{};
   if (bits_of(once) != 0) {
@@ -392,7 +390,7 @@ void decide(const ImpactBlock& block, std::uint64_t which, const ImpactErrors& e
   for (std::size_t i = 0; i < room; i += width) {
     const unsigned wanted = unsigned(which >> i) & all_lanes;
     if (wanted == 0) continue;
-    left |= std::uint64_t(wanted & ~bits_of(kept_apart<faces ? 1 : 2>(block, i))) << i;
+    left |= std::uint64_t(wanted & ~bits_of(kept_apart < faces ? 1 : 2 > (block, i))) << i;
   }
   verdicts.free = which & ~left;
   verdicts.touching = 0;
@@ -400,7 +398,8 @@ void decide(const ImpactBlock& block, std::uint64_t which, const ImpactErrors& e
   // Brings the others together, so that no lane is idle, and repeats the last one in the lanes that remain.
   std::uint8_t query[room + width];
   std::size_t count = 0;
-  for (std::uint64_t rest = left; rest != 0; rest &= rest - 1) query[count++] = std::uint8_t(__builtin_ctzll(rest));
+  for (std::uint64_t rest = left; rest != 0; rest &= rest - 1)
+    query[count++] = std::uint8_t(__builtin_ctzll(rest));
   if (count == 0) return;
   const ImpactBlock* from = &block;
   ImpactBlock packed;

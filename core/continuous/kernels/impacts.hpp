@@ -10,7 +10,7 @@ namespace kbvh {
 
 /// Queries of one kind, coordinate by coordinate: points [0] to [3] as in MovingPoints. 12 KiB.
 struct ImpactBlock {
-  static constexpr std::size_t room = 64;  ///< queries; one bit each in masks
+  static constexpr std::size_t room = 64;    ///< queries; one bit each in masks
   alignas(64) double points[2][4][3][room];  ///< [t = 0, t = 1][point][axis][query]
 };
 
