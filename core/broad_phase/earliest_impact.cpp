@@ -1,42 +1,93 @@
 #include "core/broad_phase/earliest_impact.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
-#include <limits>
 #include <tuple>
 
 #include "core/base/assert.hpp"
 #include "core/broad_phase/approach.hpp"
+#include "core/continuous/impact_batch.hpp"
 
 namespace kbvh {
 namespace {
 
-/// Four points in motion as find_impact takes them, in double.
-struct Motion {
-  double begin[4][3], end[4][3];
-  MovingPoints points() const {
-    return {{begin[0], begin[1], begin[2], begin[3]}, {end[0], end[1], end[2], end[3]}};
+/// Candidates that are tested together, and the earliest impact among them and those before.
+class ImpactSearch {
+ public:
+  ImpactSearch(CandidateKind kind, double separation, EarliestImpact& earliest, EarliestImpactStats& counts)
+      : kind_(kind),
+        separation_(separation),
+        earliest_(&earliest),
+        counts_(&counts),
+        batch_(kind == CandidateKind::edge_edge ? Contact::Kind::edge_edge : Contact::Kind::vertex_face) {}
+
+  /// Adds a candidate and its points at t = 0 and t = 1, in the order of MovingPoints.
+  template <class S>
+  void add(const Candidate& candidate, const S* const (&begin)[4], const S* const (&end)[4]) {
+    candidates_[batch_.size()] = candidate;
+    batch_.add(begin, end);
+    if (batch_.full()) test();
   }
 
-  /// Returns whether the points [0, split) and the others are certainly in two boxes that are farther apart
-  /// than the separation from t = 0 to t.
-  bool apart_until(double t, int split, double separation) const {
-    constexpr double infinity = std::numeric_limits<double>::infinity();
-    for (int axis = 0; axis < 3; ++axis) {
-      double low[2] = {infinity, infinity}, high[2] = {-infinity, -infinity}, largest = 0;
-      for (int i = 0; i < 4; ++i) {
-        const double from = begin[i][axis], to = end[i][axis], there = (1 - t) * from + t * to;
-        const int side = i < split ? 0 : 1;
-        low[side] = std::min({low[side], from, there});
-        high[side] = std::max({high[side], from, there});
-        largest = std::max({largest, std::fabs(from), std::fabs(to)});
-      }
-      // Each place at t is wrong by less than 4 half ulps of the largest number, and by underflow.
-      const double margin = (separation + largest * 0x1p-49) * (1 + 0x1p-50) + 0x1p-1000;
-      if (low[0] - high[1] > margin || low[1] - high[0] > margin) return true;
-    }
-    return false;
+  /// Tests all that were added.
+  void test() {
+    if (separation_ > 0)
+      test_approaches();
+    else
+      test_impacts();
+    batch_.clear();
   }
+
+ private:
+  void test_impacts() {
+    const ImpactBatch::Mask sooner = leave_out_later(batch_.all());
+    batch_.decide(sooner, &counts_->impacts);
+    for (ImpactBatch::Mask rest = sooner; rest != 0; rest &= rest - 1) {
+      const auto i = std::size_t(std::countr_zero(rest));
+      take(candidates_[i], batch_.impact(i));
+    }
+  }
+
+  void test_approaches() {
+    ImpactBatch::Mask rest = leave_out_later(batch_.all());
+    for (double until = earliest_->end; rest != 0; rest &= rest - 1) {
+      if (earliest_->end < until) {
+        until = earliest_->end;
+        rest = leave_out_later(rest);
+        if (rest == 0) return;
+      }
+      const auto i = std::size_t(std::countr_zero(rest));
+      const ImpactBatch::Query query = batch_.query(i);
+      take(candidates_[i], find_approach(batch_.kind(), query.points(), separation_, &counts_->impacts));
+    }
+  }
+
+  /// Returns those of the given candidates that may be within the separation by the earliest impact.
+  ImpactBatch::Mask leave_out_later(ImpactBatch::Mask which) {
+    const ImpactBatch::Mask later = which & batch_.apart_until(earliest_->end, separation_);
+    counts_->later += std::uint64_t(std::popcount(later));
+    return which & ~later;
+  }
+
+  void take(const Candidate& candidate, const Impact& impact) {
+    if (!impact.touches) return;
+    const auto key = [](double time, CandidateKind of, const Candidate& pair) {
+      return std::tuple(time, of, pair.first, pair.second);
+    };
+    if (earliest_->touches &&
+        key(earliest_->end, earliest_->kind, earliest_->pair) < key(impact.end, kind_, candidate))
+      return;
+    // Every other first contact ends no earlier, so it begins no earlier than this.
+    *earliest_ = {true, kind_, candidate, std::max(0.0, impact.end - impact_width), impact.end};
+  }
+
+  CandidateKind kind_;
+  double separation_;
+  EarliestImpact* earliest_;
+  EarliestImpactStats* counts_;
+  ImpactBatch batch_;
+  Candidate candidates_[ImpactBatch::room];
 };
 
 }  // namespace
@@ -48,9 +99,8 @@ void take_earlier_impacts(CandidateKind kind, const Elements& elements, const S*
   KBVH_ASSERT(kind == CandidateKind::face_vertex || kind == CandidateKind::edge_edge);
   KBVH_ASSERT(patches == nullptr || separation == 0);
   const bool edges = kind == CandidateKind::edge_edge;
-  const Contact::Kind contact = edges ? Contact::Kind::edge_edge : Contact::Kind::vertex_face;
   EarliestImpactStats counts;
-  Motion motion;
+  ImpactSearch search(kind, separation, earliest, counts);
   for (const Candidate& candidate : candidates) {
     ++counts.candidates;
     if (patches != nullptr && patches->together(kind, candidate)) {
@@ -63,28 +113,11 @@ void take_earlier_impacts(CandidateKind kind, const Elements& elements, const S*
     // Of a vertex and a face, find_impact takes the vertex first.
     std::copy(second.begin(), second.end(), edges ? vertices + 2 : vertices);
     std::copy(first.begin(), first.end(), edges ? vertices : vertices + 1);
-    for (int i = 0; i < 4; ++i)
-      for (int axis = 0; axis < 3; ++axis) {
-        motion.begin[i][axis] = double(begin[std::size_t(4) * vertices[i] + std::size_t(axis)]);
-        motion.end[i][axis] = double(end[std::size_t(4) * vertices[i] + std::size_t(axis)]);
-      }
-    if (motion.apart_until(earliest.end, edges ? 2 : 1, separation)) {
-      ++counts.later;
-      continue;
-    }
-    const Impact impact = separation > 0
-                              ? find_approach(contact, motion.points(), separation, &counts.impacts)
-                              : find_impact(contact, motion.points(), &counts.impacts);
-    if (!impact.touches) continue;
-    const auto key = [](double time, CandidateKind of, const Candidate& pair) {
-      return std::tuple(time, of, pair.first, pair.second);
-    };
-    if (earliest.touches &&
-        key(earliest.end, earliest.kind, earliest.pair) < key(impact.end, kind, candidate))
-      continue;
-    // Every other first contact ends no earlier, so it begins no earlier than this.
-    earliest = {true, kind, candidate, std::max(0.0, impact.end - impact_width), impact.end};
+    const auto at = [&](const S* points, int i) { return points + std::size_t(4) * vertices[i]; };
+    search.add(candidate, {at(begin, 0), at(begin, 1), at(begin, 2), at(begin, 3)},
+               {at(end, 0), at(end, 1), at(end, 2), at(end, 3)});
   }
+  search.test();
   if (stats == nullptr) return;
   stats->candidates += counts.candidates;
   stats->culled += counts.culled;

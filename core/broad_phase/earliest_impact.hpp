@@ -24,14 +24,15 @@ struct EarliestImpact {
 struct EarliestImpactStats {
   std::uint64_t candidates = 0;
   std::uint64_t culled = 0;  ///< of one patch, which does not touch itself during the motion
-  std::uint64_t later = 0;   ///< apart until an impact that was found before
+  std::uint64_t later = 0;   ///< proved to be apart until an impact that was found before, or until t = 1
   ImpactStats impacts{};     ///< of all others
 };
 
 /// Takes the earlier of `earliest` and the first times at which candidates, face_vertex or edge_edge, are
-/// within the separation: exact verdicts by find_impact for a separation of 0, else by find_approach. Points
-/// are [vertex][4], at t = 0 and t = 1. The result does not depend on the order of candidates. Candidates
-/// within one of the `patches` are skipped; these must be certified for the motion, and the separation 0.
+/// within the separation: exact verdicts of find_impact for a separation of 0, else of find_approach.
+/// Candidates are filtered in batches (core/continuous/impact_batch.hpp). Points are [vertex][4], at t = 0
+/// and t = 1. The result does not depend on the order of candidates. Candidates within one of the `patches`
+/// are skipped; these must be certified for the motion, and the separation 0.
 template <class S>
 void take_earlier_impacts(CandidateKind kind, const Elements& elements, const S* begin, const S* end,
                           std::span<const Candidate> candidates, double separation, EarliestImpact& earliest,

@@ -99,27 +99,48 @@ template <class S>
 void ContactFinder<S>::find(const Playback<S>& playback, std::span<const PrimitivePair> pairs,
                             ContactBuffer& out) {
   finish(playback);
-  for (const PrimitivePair& pair : pairs) faces(pair, out);
+  const auto take = [&](const Contact& contact, const MovingPoints& points) {
+    ImpactBatch& batch = batches_[std::size_t(contact.kind)];
+    batch.add(points);
+    taken_[taken_count_++] = contact;
+    if (batch.full()) decide_batches(out);
+  };
+  for (const PrimitivePair& pair : pairs) faces(pair, take);
+  decide_batches(out);
 }
 
 template <class S>
-void ContactFinder<S>::faces(const PrimitivePair& pair, ContactBuffer& out) {
+void ContactFinder<S>::decide_batches(ContactBuffer& out) {
+  for (ImpactBatch& batch : batches_) batch.decide(&stats_);
+  std::size_t read[2] = {0, 0};
+  for (std::size_t i = 0; i < taken_count_; ++i) {
+    const auto kind = std::size_t(taken_[i].kind);
+    report(taken_[i], batches_[kind].impact(read[kind]++), out);
+  }
+  for (ImpactBatch& batch : batches_) batch.clear();
+  taken_count_ = 0;
+}
+
+template <class S>
+template <class Take>
+void ContactFinder<S>::faces(const PrimitivePair& pair, const Take& take) {
   const Features::Face& a = features_[pair.body_a].faces()[pair.primitive_a];
   const Features::Face& b = features_[pair.body_b].faces()[pair.primitive_b];
   for (std::uint32_t i = 0; i < 3; ++i) {
     if ((a.owned_vertices >> i & 1U) != 0)
-      vertex_face(pair.body_a, a.vertices[i], pair.body_b, pair.primitive_b, out);
+      vertex_face(pair.body_a, a.vertices[i], pair.body_b, pair.primitive_b, take);
     if ((b.owned_vertices >> i & 1U) != 0)
-      vertex_face(pair.body_b, b.vertices[i], pair.body_a, pair.primitive_a, out);
+      vertex_face(pair.body_b, b.vertices[i], pair.body_a, pair.primitive_a, take);
     if ((a.owned_edges >> i & 1U) == 0) continue;
     for (std::uint32_t j = 0; j < 3; ++j)
-      if ((b.owned_edges >> j & 1U) != 0) edge_edge(pair.body_a, a.edges[i], pair.body_b, b.edges[j], out);
+      if ((b.owned_edges >> j & 1U) != 0) edge_edge(pair.body_a, a.edges[i], pair.body_b, b.edges[j], take);
   }
 }
 
 template <class S>
+template <class Take>
 void ContactFinder<S>::vertex_face(std::uint32_t body_a, std::uint32_t vertex, std::uint32_t body_b,
-                                   std::uint32_t face, ContactBuffer& out) {
+                                   std::uint32_t face, const Take& take) {
   const std::uint32_t(&corners)[3] = features_[body_b].faces()[face].vertices;
   if (body_a == body_b && (vertex == corners[0] || vertex == corners[1] || vertex == corners[2])) return;
   MovingPoints points;
@@ -128,12 +149,13 @@ void ContactFinder<S>::vertex_face(std::uint32_t body_a, std::uint32_t vertex, s
     p[0] = positions_[end][body_a].data() + std::size_t(3) * vertex;
     for (int i = 0; i < 3; ++i) p[i + 1] = positions_[end][body_b].data() + std::size_t(3) * corners[i];
   }
-  report({Contact::Kind::vertex_face, body_a, vertex, body_b, face, 0, 0}, points, out);
+  take(Contact{Contact::Kind::vertex_face, body_a, vertex, body_b, face, 0, 0}, points);
 }
 
 template <class S>
+template <class Take>
 void ContactFinder<S>::edge_edge(std::uint32_t body_a, std::uint32_t edge_a, std::uint32_t body_b,
-                                 std::uint32_t edge_b, ContactBuffer& out) {
+                                 std::uint32_t edge_b, const Take& take) {
   if (body_a == body_b && edge_a > edge_b) std::swap(edge_a, edge_b);
   const auto& a = features_[body_a].edges()[edge_a].vertices;
   const auto& b = features_[body_b].edges()[edge_b].vertices;
@@ -146,12 +168,11 @@ void ContactFinder<S>::edge_edge(std::uint32_t body_a, std::uint32_t edge_a, std
       p[i + 2] = positions_[end][body_b].data() + std::size_t(3) * b[i];
     }
   }
-  report({Contact::Kind::edge_edge, body_a, edge_a, body_b, edge_b, 0, 0}, points, out);
+  take(Contact{Contact::Kind::edge_edge, body_a, edge_a, body_b, edge_b, 0, 0}, points);
 }
 
 template <class S>
-void ContactFinder<S>::report(Contact contact, const MovingPoints& points, ContactBuffer& out) {
-  const Impact impact = find_impact(contact.kind, points, &stats_);
+void ContactFinder<S>::report(Contact contact, const Impact& impact, ContactBuffer& out) {
   if (!impact.touches) return;
   constexpr double infinity = std::numeric_limits<double>::infinity();
   // The length, the product and the sum are rounded; three steps outwards cover these errors. Ends are exact.
@@ -170,6 +191,7 @@ void ContactFinder<S>::report(Contact contact, const MovingPoints& points, Conta
 template <class S>
 void ContactFinder<S>::find_all(const Playback<S>& playback, ContactBuffer& out) {
   finish(playback);
+  const auto take = each_alone(out);
   for (const BodyPair& pair : scene_->pairs) {
     const auto all_vertices = [&](std::uint32_t body_a, std::uint32_t body_b) {
       std::vector<bool> used(scene_->bodies[body_a].plans.vertex_count());
@@ -178,7 +200,7 @@ void ContactFinder<S>::find_all(const Playback<S>& playback, ContactBuffer& out)
           if ((face.owned_vertices >> i & 1) != 0) used[face.vertices[i]] = true;
       for (std::uint32_t v = 0; v < used.size(); ++v)
         for (std::uint32_t face = 0; used[v] && face < features_[body_b].faces().size(); ++face)
-          if (scene_->bodies[body_b].primitives.alive(face)) vertex_face(body_a, v, body_b, face, out);
+          if (scene_->bodies[body_b].primitives.alive(face)) vertex_face(body_a, v, body_b, face, take);
     };
     all_vertices(pair.first, pair.second);
     if (pair.first != pair.second) all_vertices(pair.second, pair.first);
@@ -186,13 +208,14 @@ void ContactFinder<S>::find_all(const Playback<S>& playback, ContactBuffer& out)
     const std::size_t edges_b = features_[pair.second].edges().size();
     for (std::uint32_t i = 0; i < edges_a; ++i)
       for (std::uint32_t j = pair.first == pair.second ? i + 1 : 0; j < edges_b; ++j)
-        edge_edge(pair.first, i, pair.second, j, out);
+        edge_edge(pair.first, i, pair.second, j, take);
   }
 }
 
 template <class S>
 void ContactFinder<S>::find_by_sweep(const Playback<S>& playback, ContactBuffer& out) {
   finish(playback);
+  const auto take = each_alone(out);
   struct Item {
     Box<double> box;
     std::uint32_t primitive;
@@ -221,7 +244,7 @@ void ContactFinder<S>::find_by_sweep(const Playback<S>& playback, ContactBuffer&
         const bool turned = items[i].second;
         if ((!within && items[j].second == turned) || !overlap(items[i].box, items[j].box)) continue;
         const Item &a = items[turned ? j : i], &b = items[turned ? i : j];
-        faces({pair.first, a.primitive, pair.second, b.primitive}, out);
+        faces({pair.first, a.primitive, pair.second, b.primitive}, take);
       }
   }
 }

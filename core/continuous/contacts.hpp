@@ -1,9 +1,11 @@
 #pragma once
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "core/continuous/impact.hpp"
+#include "core/continuous/impact_batch.hpp"
 #include "core/scene/playback.hpp"
 #include "core/scene/scene.hpp"
 
@@ -57,10 +59,11 @@ class ContactFinder {
   void start(const Playback<S>& playback);
   /// Ends the motion at the playback's time, with its positions. Appends the contacts of the features of
   /// pairs of faces, each once if each pair is listed once; features that share a vertex have no contact.
-  /// Times of impact are enclosed to within `impact_width` of the motion's length, rounded outwards.
+  /// Times of impact are enclosed to within `impact_width` of the motion's length, rounded outwards. Features
+  /// are tested in batches.
   void find(const Playback<S>& playback, std::span<const PrimitivePair> pairs, ContactBuffer& out);
   /// Appends the contacts of every vertex with every face, and of every edge with every edge, for the scene's
-  /// pairs of bodies: the oracle. O(n^2).
+  /// pairs of bodies, one by one: the oracle. O(n^2).
   void find_all(const Playback<S>& playback, ContactBuffer& out);
   /// Appends the same contacts as `find_all`, by sort-and-sweep of the faces' swept boxes: for larger scenes.
   void find_by_sweep(const Playback<S>& playback, ContactBuffer& out);
@@ -72,12 +75,24 @@ class ContactFinder {
 
  private:
   void finish(const Playback<S>& playback);
+  // These call take(contact, points) for two features, or for all of two faces; the contact has no time yet.
+  template <class Take>
   void vertex_face(std::uint32_t body_a, std::uint32_t vertex, std::uint32_t body_b, std::uint32_t face,
-                   ContactBuffer& out);
+                   const Take& take);
+  template <class Take>
   void edge_edge(std::uint32_t body_a, std::uint32_t edge_a, std::uint32_t body_b, std::uint32_t edge_b,
-                 ContactBuffer& out);
-  void report(Contact contact, const MovingPoints& points, ContactBuffer& out);
-  void faces(const PrimitivePair& pair, ContactBuffer& out);
+                 const Take& take);
+  template <class Take>
+  void faces(const PrimitivePair& pair, const Take& take);
+  /// Returns a function that tests features at once, to be taken.
+  auto each_alone(ContactBuffer& out) {
+    return [this, &out](const Contact& contact, const MovingPoints& points) {
+      report(contact, find_impact(contact.kind, points, &stats_), out);
+    };
+  }
+  /// Decides the batches, and reports their contacts in the order in which the features were taken.
+  void decide_batches(ContactBuffer& out);
+  void report(Contact contact, const Impact& impact, ContactBuffer& out);
 
   const Scene<S>* scene_;
   std::vector<Features> features_;
@@ -85,6 +100,10 @@ class ContactFinder {
   std::vector<std::vector<double>> positions_[2];  ///< [end][body][vertex][3]
   double begin_ = 0, end_ = 0;
   ImpactStats stats_;
+  ImpactBatch batches_[2]{ImpactBatch(Contact::Kind::vertex_face),
+                          ImpactBatch(Contact::Kind::edge_edge)};  ///< [kind]
+  std::array<Contact, 2 * ImpactBatch::room> taken_{};             ///< of both batches, without times
+  std::size_t taken_count_ = 0;
 };
 
 extern template class ContactFinder<float>;

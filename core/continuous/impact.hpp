@@ -45,7 +45,8 @@ struct ImpactStats {
 ///
 /// Any finite coordinates up to admissible_magnitude<double> are decided exactly. A filtered test costs 0.1
 /// to 1 us, an exact test about 10 us, more if exponents differ much; an exact test may allocate.
-/// Thread-safe; `stats`, if given, must not be shared between threads.
+/// Thread-safe; `stats`, if given, must not be shared between threads. Many queries are decided faster in
+/// batches (impact_batch.hpp).
 Impact find_impact(Contact::Kind kind, const MovingPoints& points, ImpactStats* stats = nullptr);
 
 /// Decides the same without the filter, for tests.

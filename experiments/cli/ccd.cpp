@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 
+#include "core/continuous/impact_batch.hpp"
 #include "core/contract/registry.hpp"
 #include "experiments/cli/commands.hpp"
 #include "experiments/cli/options.hpp"
@@ -33,9 +34,10 @@ constexpr const char* ccd_examples = R"(Examples:
   kbvh ccd queries/unit-tests frames/cloth-ball --out results/ccd
 Decides queries of continuous collision detection (a vertex and a face, or two edges, in linear motion) exactly, and
 compares with the given verdicts. Input: files with 8 rows per query in exact rationals, folders of such files, and
-pairs of frames with lists of pairs, as in the NYU CCD benchmark (Wang et al. 2021). The table also has the peers' own
-continuous tests of the same two features, in floating point, if they are built in. DIR/ccd.json has the table; if DIR
-is the folder of a study, the study's report includes it. With --candidates, counts the pairs of features whose swept
+pairs of frames with lists of pairs, as in the NYU CCD benchmark (Wang et al. 2021). kbvh decides the queries of a file
+in batches. The table also has the peers' own continuous tests of the same two features, in floating point, one query
+at a time, if they are built in. DIR/ccd.json has the table; if DIR is the folder of a study, the study's report
+includes it. With --candidates, counts the pairs of features whose swept
 boxes meet between the two frames of each pair, next to published counts.
 Exit codes: 0 all verdicts are right, 1 one is wrong, 2 wrong use or input, 3 other error.)";
 
@@ -61,29 +63,66 @@ std::vector<Peer> peers() {
   return found;
 }
 
-/// Decides all queries once and compares with the truth; `test` returns whether one touches.
+/// The exact test, on queries of one kind in batches.
+class ExactTest {
+ public:
+  /// Calls take(query, touches) for all queries, in their order.
+  template <class Take>
+  void operator()(const ImpactQueries& queries, const Take& take) {
+    std::size_t first = 0;
+    const auto decide = [&](ImpactBatch& batch) {
+      batch.decide(&stats_);
+      for (std::size_t i = 0; i < batch.size(); ++i)
+        take(queries.queries[first + i], batch.impact(i).touches);
+      first += batch.size();
+      batch.clear();
+    };
+    for (std::size_t i = 0; i < queries.queries.size(); ++i) {
+      const ImpactQuery& query = queries.queries[i];
+      ImpactBatch& batch = batches_[std::size_t(query.kind)];
+      batch.add(query.moving());
+      const bool last = i + 1 == queries.queries.size() || queries.queries[i + 1].kind != query.kind;
+      if (batch.full() || last) decide(batch);
+    }
+  }
+  const ImpactStats& stats() const { return stats_; }
+
+ private:
+  ImpactBatch batches_[2]{ImpactBatch(Contact::Kind::vertex_face), ImpactBatch(Contact::Kind::edge_edge)};
+  ImpactStats stats_;
+};
+
+/// A peer's test, query by query.
+struct PeerTest {
+  bool (*touches)(Contact::Kind, const MovingPoints&);
+  template <class Take>
+  void operator()(const ImpactQueries& queries, const Take& take) const {
+    for (const ImpactQuery& query : queries.queries) take(query, touches(query.kind, query.moving()));
+  }
+};
+
+/// Decides all queries once and compares with the truth.
 template <class Test>
-void judge(const ImpactQueries& queries, Row& row, const Test& test) {
-  for (const ImpactQuery& query : queries.queries) {
-    const bool touches = test(query.kind, query.moving());
+void judge(const ImpactQueries& queries, Row& row, Test& test) {
+  test(queries, [&](const ImpactQuery& query, bool touches) {
     row.positives += touches ? 1 : 0;
-    if (!query.truth) continue;
+    if (!query.truth) return;
     if (*query.truth && !touches) ++row.missed;
     if (!*query.truth && touches) ++row.extra;
-  }
+  });
 }
 
 /// Decides all queries repeatedly until that has taken `seconds`. Doubles the number of passes between two
 /// reads of the clock, because a read costs more than a query.
 template <class Test>
-void time_passes(const ImpactQueries& queries, Row& row, double seconds, const Test& test) {
+void time_passes(const ImpactQueries& queries, Row& row, double seconds, Test& test) {
   if (queries.queries.empty()) return;
   std::uint64_t touching = 0;
   double here = 0;
   for (std::uint64_t passes = 1; passes == 1 || here < seconds; passes *= 2) {
     const auto begin = std::chrono::steady_clock::now();
     for (std::uint64_t k = 0; k < passes; ++k)
-      for (const auto& query : queries.queries) touching += test(query.kind, query.moving()) ? 1 : 0;
+      test(queries, [&](const ImpactQuery& /*query*/, bool touches) { touching += touches ? 1 : 0; });
     here += seconds_since(begin);
     row.passes += passes;
   }
@@ -94,20 +133,17 @@ void time_passes(const ImpactQueries& queries, Row& row, double seconds, const T
 /// Times the exact test and the peers alternately, each for `seconds` in total.
 std::vector<Row> measure(const ImpactQueries& queries, const std::vector<Peer>& others, double seconds) {
   std::vector<Row> rows(1 + others.size());
-  ImpactStats stats, ignored;
-  const auto exact = [](ImpactStats& counts) {
-    return [&counts](Contact::Kind kind, const MovingPoints& points) {
-      return find_impact(kind, points, &counts).touches;
-    };
-  };
-  judge(queries, rows[0], exact(stats));
-  rows[0].filtered = stats.filtered;
-  for (std::size_t i = 0; i < others.size(); ++i) judge(queries, rows[1 + i], others[i].touches);
+  ExactTest exact;
+  std::vector<PeerTest> tests;
+  for (const Peer& other : others) tests.push_back({other.touches});
+  judge(queries, rows[0], exact);
+  rows[0].filtered = exact.stats().filtered;
+  for (std::size_t i = 0; i < tests.size(); ++i) judge(queries, rows[1 + i], tests[i]);
   const int turns = seconds > 0 ? 4 : 1;
   for (int turn = 0; turn < turns; ++turn) {
-    time_passes(queries, rows[0], seconds / turns, exact(ignored));
-    for (std::size_t i = 0; i < others.size(); ++i)
-      time_passes(queries, rows[1 + i], seconds / turns, others[i].touches);
+    time_passes(queries, rows[0], seconds / turns, exact);
+    for (std::size_t i = 0; i < tests.size(); ++i)
+      time_passes(queries, rows[1 + i], seconds / turns, tests[i]);
   }
   return rows;
 }

@@ -2,11 +2,15 @@
 // et al. 2021).
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
+#include <functional>
 #include <set>
 #include <tuple>
+#include <vector>
 
 #include "core/continuous/contacts.hpp"
+#include "core/continuous/impact_batch.hpp"
 #include "core/judge/session.hpp"
 #include "experiments/common/environment.hpp"
 #include "experiments/io/animated_mesh.hpp"
@@ -39,6 +43,52 @@ TEST(ImpactTruth, EveryVerdictIsRight) {
   EXPECT_GT(queries, 100000u);
   EXPECT_GT(touching, 100000u);
   EXPECT_EQ(stats.filtered + stats.exact, queries);
+}
+
+// Batches give the verdicts and enclosures of single tests to the last bit, with every kernel set.
+TEST(ImpactTruth, BatchesDecideAsSingleTests) {
+  const std::filesystem::path folder = data_folder() / "ccd";
+  if (!std::filesystem::exists(folder)) GTEST_SKIP() << "no queries at " << folder << " (set KBVH_DATA)";
+  std::uint64_t queries = 0, filtered = 0;
+  for (const ImpactQueries& file : find_impact_queries(folder)) {
+    std::vector<Impact> single;
+    ImpactStats single_stats;
+    for (const ImpactQuery& query : file.queries)
+      single.push_back(find_impact(query.kind, query.moving(), &single_stats));
+    queries += file.queries.size();
+    std::vector<std::uint64_t> exact;
+    for (const KernelSet set : supported_kernel_sets()) {
+      ImpactStats stats;
+      std::uint64_t differing = 0;
+      ImpactBatch batches[2]{ImpactBatch(Contact::Kind::vertex_face, set),
+                             ImpactBatch(Contact::Kind::edge_edge, set)};
+      for (std::size_t i = 0, first = 0; i < file.queries.size(); ++i) {
+        ImpactBatch& batch = batches[std::size_t(file.queries[i].kind)];
+        ASSERT_EQ(file.queries[i].kind, file.queries[0].kind);
+        batch.add(file.queries[i].moving());
+        if (!batch.full() && i + 1 < file.queries.size()) continue;
+        batch.decide(&stats);
+        for (std::size_t k = 0; k < batch.size(); ++k) {
+          const Impact &found = batch.impact(k), &expected = single[first + k];
+          differing +=
+              found.touches != expected.touches || found.begin != expected.begin || found.end != expected.end
+                  ? 1
+                  : 0;
+        }
+        first = i + 1;
+        batch.clear();
+      }
+      EXPECT_EQ(differing, 0u) << file.name << ", " << name(set);
+      EXPECT_EQ(stats.tests, file.queries.size());
+      EXPECT_LE(stats.exact, single_stats.exact) << file.name << ", " << name(set);
+      exact.push_back(stats.exact);
+      filtered += set == KernelSet::portable ? stats.filtered : 0;
+    }
+    EXPECT_EQ(std::adjacent_find(exact.begin(), exact.end(), std::not_equal_to<>()), exact.end())
+        << file.name;
+  }
+  EXPECT_GT(queries, 100000u);
+  EXPECT_GT(filtered, queries / 2);
 }
 
 // Does the same without the filter, where that takes only seconds.

@@ -1,0 +1,266 @@
+// Impacts per second: in batches, one by one, and by the continuous tests of peers, in one run and by turns,
+// on pairs between two real frames: those with known verdicts, and all candidates of kbvh::broad_phase.
+// Prints medians of processor time as queries per second and ratios, and compares them with targets; FILE
+// receives all times, ratios and targets. Exit code 1: batches and single tests differ.
+//   kbvh_impact_bench [FRAMES] [REPETITIONS] [FILE]
+// FRAMES is a folder with a pair of frames, or one of such folders (default: ccd/frames of the data folder).
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "core/broad_phase/broad_phase.hpp"
+#include "core/continuous/impact_batch.hpp"
+#include "core/contract/registry.hpp"
+#include "experiments/common/environment.hpp"
+#include "experiments/common/machine.hpp"
+#include "experiments/study/impact_queries.hpp"
+
+namespace kbvh::experiments {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The processor's time of this program, which has one thread: other programs disturb it least.
+double seconds() {
+  return double(std::clock()) / CLOCKS_PER_SEC;
+}
+
+/// Pairs of ids of one kind, as they come from a broad phase: a vertex and a face, or two edges.
+struct Pairs {
+  std::string name;
+  Contact::Kind kind;
+  std::vector<std::array<std::uint32_t, 2>> ids;
+};
+
+/// Calls take(points) for each pair.
+template <class Take>
+void for_each(const FramePair& frames, const Pairs& pairs, const Take& take) {
+  for (const auto& [first, second] : pairs.ids) {
+    std::uint32_t corners[4];
+    if (pairs.kind == Contact::Kind::vertex_face) {
+      corners[0] = first;
+      std::copy_n(frames.faces[second].begin(), 3, corners + 1);
+    } else {
+      std::copy_n(frames.edges[first].begin(), 2, corners);
+      std::copy_n(frames.edges[second].begin(), 2, corners + 2);
+    }
+    MovingPoints points;
+    for (int i = 0; i < 4; ++i) {
+      points.begin[i] = frames.positions[0].data() + std::size_t(3) * corners[i];
+      points.end[i] = frames.positions[1].data() + std::size_t(3) * corners[i];
+    }
+    take(points);
+  }
+}
+
+/// What a test found in all pairs: a number that depends on every verdict and, for exact tests, every time.
+struct Found {
+  std::uint64_t touching = 0;
+  double times = 0;
+  void add(const Impact& impact) {
+    touching += impact.touches ? 1 : 0;
+    times += impact.begin + 2 * impact.end;
+  }
+};
+
+Found in_batches(const FramePair& frames, const Pairs& pairs, ImpactStats* stats) {
+  Found found;
+  ImpactBatch batch(pairs.kind);
+  const auto decide = [&] {
+    batch.decide(stats);
+    for (std::size_t i = 0; i < batch.size(); ++i) found.add(batch.impact(i));
+    batch.clear();
+  };
+  for_each(frames, pairs, [&](const MovingPoints& points) {
+    batch.add(points);
+    if (batch.full()) decide();
+  });
+  decide();
+  return found;
+}
+Found one_by_one(const FramePair& frames, const Pairs& pairs, ImpactStats* stats) {
+  Found found;
+  for_each(frames, pairs,
+           [&](const MovingPoints& points) { found.add(find_impact(pairs.kind, points, stats)); });
+  return found;
+}
+
+struct Contestant {
+  std::string name;
+  std::function<Found()> work;
+  Found found{};
+  std::vector<double> times{};  ///< seconds
+  double per_second = 0;
+};
+
+class Bench {
+ public:
+  explicit Bench(int repetitions) : repetitions_(repetitions) {
+    for (const StrategyEntry& entry : registry())
+      if (entry.info.own_impact != nullptr) peers_.push_back({entry.info.id, entry.info.own_impact});
+  }
+
+  void compare(const FramePair& frames, const Pairs& pairs) {
+    if (pairs.ids.empty()) return;
+    ImpactStats stats, single_stats;
+    std::vector<Contestant> contestants{
+        {"in batches", [&] { return in_batches(frames, pairs, &stats); }},
+        {"one by one", [&] { return one_by_one(frames, pairs, &single_stats); }}};
+    for (const auto& peer : peers_)
+      contestants.push_back({peer.id, [&] {
+                               Found found;
+                               for_each(frames, pairs, [&](const MovingPoints& points) {
+                                 found.touching += peer.touches(pairs.kind, points) ? 1 : 0;
+                               });
+                               return found;
+                             }});
+    for (int r = -1; r < repetitions_; ++r)
+      for (Contestant& contestant : contestants) {
+        const double begin = seconds();
+        contestant.found = contestant.work();
+        if (r >= 0) contestant.times.push_back(seconds() - begin);
+      }
+    const Found &ours = contestants[0].found, &single = contestants[1].found;
+    if (ours.touching != single.touching || ours.times != single.times) differs_ = true;
+    const double exact = double(stats.exact) / double(stats.tests);
+    std::printf("%s: %zu queries, %llu touch, %.3f %% by integers (%.3f %% one by one)%s\n",
+                pairs.name.c_str(), pairs.ids.size(), (unsigned long long)ours.touching, 100 * exact,
+                100 * double(single_stats.exact) / double(single_stats.tests),
+                differs_ ? ", BATCHES DIFFER" : "");
+    nlohmann::json rows = nlohmann::json::array();
+    for (Contestant& contestant : contestants) {
+      std::sort(contestant.times.begin(), contestant.times.end());
+      const double median = contestant.times[contestant.times.size() / 2];
+      contestant.per_second = median > 0 ? double(pairs.ids.size()) / median : 0;
+      std::printf("  %-20s %12.4g per second  %8.2f ns each  %8llu touch\n", contestant.name.c_str(),
+                  contestant.per_second, 1e9 * median / double(pairs.ids.size()),
+                  (unsigned long long)contestant.found.touching);
+      rows.push_back({{"name", contestant.name},
+                      {"seconds", contestant.times},
+                      {"queries_per_second", contestant.per_second},
+                      {"touching", contestant.found.touching}});
+    }
+    comparisons_.push_back(
+        {{"pairs", pairs.name}, {"queries", pairs.ids.size()}, {"exact", exact}, {"contestants", rows}});
+    for (std::size_t i = 1; i < contestants.size(); ++i)
+      target(pairs.name + ": batches over " + contestants[i].name,
+             contestants[0].per_second / contestants[i].per_second, i == 1 ? 0 : 0.5, i == 1 ? 0 : 1.5);
+  }
+
+  void print_targets() const {
+    std::printf("Targets\n");
+    for (const nlohmann::json& target : targets_)
+      std::printf("  %-70s %7.2f x  (%g, aim %g): %s\n", target["what"].get<std::string>().c_str(),
+                  target["ratio"].get<double>(), target["at_least"].get<double>(),
+                  target["aim"].get<double>(), target["verdict"].get<std::string>().c_str());
+    if (peers_.empty()) std::printf("  no peer with a continuous test of its own is built in\n");
+  }
+  void write(const fs::path& file) const {
+    const nlohmann::json result{{"program", "kbvh_impact_bench"},
+                                {"time", now_utc()},
+                                {"commit", commit()},
+                                {"dirty", dirty()},
+                                {"machine", machine()},
+                                {"kernels", name(active_kernel_set())},
+                                {"repetitions", repetitions_},
+                                {"clock", "processor time, median of repetitions by turns, one thread"},
+                                {"comparisons", comparisons_},
+                                {"targets", targets_}};
+    std::ofstream out(file);
+    out << result.dump(2) << '\n';
+    if (!out.flush()) throw std::runtime_error("cannot write " + file.string());
+  }
+  bool differs() const { return differs_; }
+
+ private:
+  struct Peer {
+    std::string id;
+    bool (*touches)(Contact::Kind, const MovingPoints&);
+  };
+
+  void target(const std::string& what, double ratio, double at_least, double aim) {
+    const char* const verdict = at_least == 0      ? "reported"
+                                : ratio < at_least ? "missed"
+                                : ratio < aim      ? "met"
+                                                   : "met, and the aim";
+    targets_.push_back(
+        {{"what", what}, {"ratio", ratio}, {"at_least", at_least}, {"aim", aim}, {"verdict", verdict}});
+  }
+
+  int repetitions_;
+  std::vector<Peer> peers_;
+  bool differs_ = false;
+  nlohmann::json comparisons_ = nlohmann::json::array(), targets_ = nlohmann::json::array();
+};
+
+void compare_frames(const FramePair& frames, Bench& bench) {
+  using View = MatrixView<double>;
+  using Ids = MatrixView<std::uint32_t>;
+  BroadPhase<double> broad;
+  const auto view = [&](int end) {
+    return View::by_rows(frames.positions[end].data(), frames.positions[end].size() / 3, 3);
+  };
+  broad.build(view(0), view(1), Ids::by_rows(frames.edges[0].data(), frames.edges.size(), 2),
+              Ids::by_rows(frames.faces[0].data(), frames.faces.size(), 3));
+  for (const Contact::Kind kind : {Contact::Kind::vertex_face, Contact::Kind::edge_edge}) {
+    const bool faces = kind == Contact::Kind::vertex_face;
+    const std::string name = frames.name + (faces ? ", vertex-face" : ", edge-edge");
+    Pairs pairs{name + ", with known verdicts", kind, {}};
+    for (const FramePair::Listed& listed : frames.listed)
+      if (listed.kind == kind) pairs.ids.push_back({listed.first, listed.second});
+    bench.compare(frames, pairs);
+    CandidateBuffer candidates;
+    if (faces)
+      broad.detect_face_vertex_candidates(candidates);
+    else
+      broad.detect_edge_edge_candidates(candidates);
+    pairs = {name + ", all candidates", kind, {}};
+    for (const Candidate& pair : candidates) {
+      if (faces)
+        pairs.ids.push_back({pair.second, pair.first});
+      else
+        pairs.ids.push_back({pair.first, pair.second});
+    }
+    bench.compare(frames, pairs);
+  }
+}
+
+int run(int argc, char** argv) {
+  const fs::path path = argc > 1 ? fs::path(argv[1]) : data_folder() / "ccd" / "frames";
+  Bench bench(argc > 2 ? std::max(1, std::atoi(argv[2])) : 5);
+  std::printf("kernels: %s\n", name(active_kernel_set()));
+  std::vector<fs::path> folders;
+  if (is_frame_pair(path)) {
+    folders.push_back(path);
+  } else if (fs::is_directory(path)) {
+    for (const auto& entry : fs::directory_iterator(path))
+      if (is_frame_pair(entry.path())) folders.push_back(entry.path());
+  }
+  if (folders.empty()) throw std::runtime_error("no pair of frames in " + path.string());
+  std::sort(folders.begin(), folders.end());
+  for (const fs::path& folder : folders) compare_frames(read_frame_pair(folder), bench);
+  bench.print_targets();
+  if (argc > 3) bench.write(argv[3]);
+  return bench.differs() ? 1 : 0;
+}
+
+}  // namespace
+}  // namespace kbvh::experiments
+
+int main(int argc, char** argv) {
+  try {
+    return kbvh::experiments::run(argc, argv);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "kbvh_impact_bench: %s\n", error.what());
+    return 2;
+  }
+}
