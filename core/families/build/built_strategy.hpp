@@ -14,7 +14,8 @@ namespace kbvh {
 /// and has
 ///   build(BuiltTree&, CurveOrder&, const PrimitiveList&)   over the boxes that the order has taken
 ///   bytes()
-/// and may have searched(): the clusters searched by all builds, which are then counted. Of the given
+/// and may have the same build with Workers before its other parameters, which is called if there are several
+/// threads, and searched(): the clusters searched by all builds, which are then counted. Of the given
 /// topologies, only the leaf size counts.
 template <class S, class Builder>
 class BuiltStrategy : public BuiltEachFrame<S, BuiltTree<S>>, public AnswersProbes<S>, public ReportsWork {
@@ -74,6 +75,15 @@ class BuiltStrategy : public BuiltEachFrame<S, BuiltTree<S>>, public AnswersProb
 
  protected:
   void build(std::uint32_t body) override {
+    if constexpr (shares) {
+      Workers& workers = this->sampled_.workers();
+      if (workers.several()) {
+        order_.take(workers, this->scene_.primitives(body), lists_[body], this->sampled_.positions(body),
+                    this->kernels_);
+        builder_.build(workers, bodies_[body], order_, lists_[body]);
+        return count_boxes(body);
+      }
+    }
     take_boxes(body);
     builder_.build(bodies_[body], order_, lists_[body]);
     count_boxes(body);
@@ -104,6 +114,9 @@ class BuiltStrategy : public BuiltEachFrame<S, BuiltTree<S>>, public AnswersProb
   virtual void followed(std::uint32_t /*body*/, const RayWork& /*work*/) {}
 
  private:
+  static constexpr bool shares =
+      requires(Builder& builder, Workers& workers, BuiltTree<S>& tree, CurveOrder<S>& order,
+               const PrimitiveList& list) { builder.build(workers, tree, order, list); };
   static constexpr bool searches = requires(const Builder& builder) { builder.searched(); };
 
   void take_boxes(std::uint32_t body) {

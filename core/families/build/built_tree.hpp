@@ -1,10 +1,12 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/families/build/kernels/build_wide.hpp"
 #include "core/families/wide/wide_tree.hpp"
+#include "core/parallel/workers.hpp"
 #include "core/topology/topology.hpp"
 
 namespace kbvh {
@@ -33,6 +35,8 @@ class BuiltTree : public WideTree<S> {
   /// Computes all boxes from those of the primitives, [primitive][8]: lower x, y, z, unused, upper x, y, z,
   /// unused.
   void fit(const S* primitive_boxes);
+  /// Does the same on several threads. `levels` has the first node of each level, from the root.
+  void fit(Workers& workers, const S* primitive_boxes, std::span<const std::uint32_t> levels);
 
   /// Returns the boxes of the leaves, [leaf][8], like those of primitives: `fit` computes them.
   S* leaf_boxes() { return leaf_boxes_.data(); }
@@ -43,9 +47,66 @@ class BuiltTree : public WideTree<S> {
   std::size_t bytes() const { return this->tree_bytes() + leaf_boxes_.capacity() * sizeof(S); }
 
  private:
+  /// Makes room for all boxes.
+  void grow();
+  /// Computes the rows and boxes of the leaves [begin, end).
+  void fit_leaves(const S* primitive_boxes, std::uint32_t begin, std::uint32_t end);
+
   std::uint32_t leaves_ = 0;
   AlignedArray<S> leaf_boxes_;
 };
+
+/// The children of a node: parts, of which those with a weight below 0 are leaves.
+template <class Part>
+struct Division {
+  static constexpr std::uint32_t most = 8;
+  std::array<Part, most> parts;
+  std::array<double, most> weights;
+  std::uint32_t count = 0;
+};
+
+/// Divides a part into the children of a node: see `lay_out`.
+template <class Source, class Part>
+void divide(Source& source, std::uint32_t leaf_size, const Part& whole, Division<Part>& to) {
+  const auto put = [&](std::uint32_t place, const Part& part) {
+    to.parts[place] = part;
+    to.weights[place] = source.count(part) <= leaf_size ? -1.0 : source.weight(part);
+  };
+  to.count = 1;
+  put(0, whole);
+  while (to.count < Division<Part>::most) {
+    std::uint32_t heaviest = 0;
+    for (std::uint32_t c = 1; c < to.count; ++c)
+      if (to.weights[c] > to.weights[heaviest]) heaviest = c;
+    if (to.weights[heaviest] < 0) break;
+    const auto [first, second] = source.split(to.parts[heaviest]);
+    put(heaviest, first);
+    put(to.count++, second);
+  }
+}
+
+/// Sets node n, adds its leaves to the tree, and appends its other children: to the tree, and to `parts`, the
+/// parts of all nodes.
+template <class S, class Source, class Part>
+void append_children(BuiltTree<S>& tree, Source& source, std::uint32_t n, const Division<Part>& division,
+                     std::vector<Part>& parts) {
+  const std::uint32_t count = division.count;
+  WideNode node;
+  node.first_leaf = tree.leaf_count();
+  node.count = std::uint8_t(count);
+  for (std::uint32_t c = 0; c < count; ++c)
+    if (division.weights[c] < 0) {
+      const auto [begin, end] = source.leaf(division.parts[c]);
+      tree.add_leaf(begin, end);
+      ++node.leaf_count;
+    }
+  if (node.leaf_count != count) node.first_child = tree.add_nodes(count - node.leaf_count);
+  if (parts.size() < tree.node_count()) parts.resize(tree.node_count());
+  std::uint32_t next = node.first_child;
+  for (std::uint32_t c = 0; c < count; ++c)
+    if (division.weights[c] >= 0) parts[next++] = division.parts[c];
+  tree.node(n) = node;
+}
 
 /// A binary tree that a builder makes from above, laid out with 8 children per node: a node takes the two
 /// children of its binary node, then repeatedly replaces the heaviest child that is not a leaf by that
@@ -59,46 +120,13 @@ class BuiltTree : public WideTree<S> {
 template <class S, class Source>
 void lay_out(BuiltTree<S>& tree, Source& source, const typename Source::Part& root,
              std::vector<typename Source::Part>& parts) {
-  using Part = typename Source::Part;
-  const std::uint32_t leaf_size = tree.leaf_size();
-  const auto is_leaf = [&](const Part& part) { return source.count(part) <= leaf_size; };
-  const auto keep = [&](std::uint32_t node, const Part& part) {
-    if (parts.size() <= node) parts.resize(node + 1);
-    parts[node] = part;
-  };
-  keep(tree.add_nodes(1), root);
-  for (std::uint32_t n = 0; n < tree.node_count(); ++n) {
-    std::array<Part, BuiltTree<S>::most_children> children;
-    std::array<double, BuiltTree<S>::most_children> weights;
-    const auto put = [&](std::uint32_t place, const Part& part) {
-      children[place] = part;
-      weights[place] = is_leaf(part) ? -1.0 : source.weight(part);
-    };
-    std::uint32_t count = 1;
-    put(0, parts[n]);
-    while (count < BuiltTree<S>::most_children) {
-      std::uint32_t heaviest = 0;
-      for (std::uint32_t c = 1; c < count; ++c)
-        if (weights[c] > weights[heaviest]) heaviest = c;
-      if (weights[heaviest] < 0) break;
-      const auto [first, second] = source.split(children[heaviest]);
-      put(heaviest, first);
-      put(count++, second);
-    }
-    WideNode node;
-    node.first_leaf = tree.leaf_count();
-    node.count = std::uint8_t(count);
-    for (std::uint32_t c = 0; c < count; ++c)
-      if (weights[c] < 0) {
-        const auto [begin, end] = source.leaf(children[c]);
-        tree.add_leaf(begin, end);
-        ++node.leaf_count;
-      }
-    if (node.leaf_count != count) node.first_child = tree.add_nodes(count - node.leaf_count);
-    std::uint32_t next = node.first_child;
-    for (std::uint32_t c = 0; c < count; ++c)
-      if (weights[c] >= 0) keep(next++, children[c]);
-    tree.node(n) = node;
+  const std::uint32_t first = tree.add_nodes(1);
+  if (parts.empty()) parts.resize(1);
+  parts[first] = root;
+  Division<typename Source::Part> division;
+  for (std::uint32_t n = first; n < tree.node_count(); ++n) {
+    divide(source, tree.leaf_size(), typename Source::Part(parts[n]), division);
+    append_children(tree, source, n, division, parts);
   }
 }
 

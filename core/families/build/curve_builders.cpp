@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <mutex>
 #include <utility>
 
 namespace kbvh {
@@ -13,6 +14,7 @@ struct CellSource {
   using Part = KeyRange;
   CurveOrder<S>& order;
   std::uint32_t leaf_size;
+  std::mutex* refining = nullptr;  ///< where several threads split
 
   static std::uint32_t count(const Part& part) { return part.end - part.begin; }
   static double weight(const Part& part) { return count(part); }
@@ -28,20 +30,29 @@ struct CellSource {
     const std::uint64_t* const keys = order.keys().data();
     const auto differing = [&] { return std::uint32_t((keys[part.begin] ^ keys[part.end - 1]) >> 32); };
     // A code that more primitives share than fit into a leaf.
-    if (differing() == 0 && !order.refine(part.begin, part.end)) return part.begin + count(part) / 2;
+    if (differing() == 0 && !refine(part)) return part.begin + count(part) / 2;
     const std::uint64_t bit = std::uint64_t(1) << (32 + std::bit_width(differing()) - 1);
     return std::uint32_t(std::partition_point(keys + part.begin, keys + part.end,
                                               [bit](std::uint64_t key) { return (key & bit) == 0; }) -
                          keys);
   }
+  bool refine(const Part& part) {
+    if (refining == nullptr) return order.refine(part.begin, part.end);
+    const std::lock_guard lock(*refining);  // ranges are disjoint, but memory for temporary use is shared
+    return order.refine(part.begin, part.end);
+  }
 };
 
-/// Writes the primitives in the order of the keys.
+/// Writes the primitives of the keys [begin, end), or of all, in their order.
 template <class S>
-void write_entries(BuiltTree<S>& tree, const CurveOrder<S>& order) {
+void write_entries(BuiltTree<S>& tree, const CurveOrder<S>& order, std::size_t begin, std::size_t end) {
   std::uint32_t* const entries = tree.entries();
   const std::uint64_t* const keys = order.keys().data();
-  for (std::uint32_t k = 0; k < order.count(); ++k) entries[k] = CurveOrder<S>::primitive(keys[k]);
+  for (std::size_t k = begin; k < end; ++k) entries[k] = CurveOrder<S>::primitive(keys[k]);
+}
+template <class S>
+void write_entries(BuiltTree<S>& tree, const CurveOrder<S>& order) {
+  write_entries(tree, order, 0, order.count());
 }
 
 /// Lays out a tree of equal leaves and full nodes, level by level from the root.
@@ -88,6 +99,38 @@ void LinearBuilder<S>::build(BuiltTree<S>& tree, CurveOrder<S>& order, const Pri
   lay_out(tree, source, KeyRange{0, order.count()}, parts_);
   write_entries(tree, order);
   tree.fit(order.boxes());
+}
+
+template <class S>
+void LinearBuilder<S>::build(Workers& workers, BuiltTree<S>& tree, CurveOrder<S>& order,
+                             const PrimitiveList& list) {
+  constexpr std::uint32_t least_shared = 1U << 12;
+  if (!workers.several() || order.count() < least_shared) return build(tree, order, list);
+  tree.clear(order.count());
+  order.sort(workers, list, Curve::morton);
+  std::mutex refining;
+  CellSource<S> source{order, tree.leaf_size(), &refining};
+  // As `lay_out`: the nodes of a level are divided at once, and then numbered in their order.
+  levels_.clear();
+  if (parts_.empty()) parts_.resize(1);
+  parts_[tree.add_nodes(1)] = {0, order.count()};
+  for (std::uint32_t begin = 0; begin < tree.node_count();) {
+    levels_.push_back(begin);
+    const std::uint32_t end = tree.node_count();
+    const Parts nodes{end - begin, 32};
+    if (divisions_.size() < nodes.count) divisions_.resize(nodes.count);
+    workers.for_each(nodes.parts(), [&](std::size_t part, std::uint32_t) {
+      for (std::size_t i = nodes.begin(part); i < nodes.end(part); ++i)
+        divide(source, source.leaf_size, parts_[begin + i], divisions_[i]);
+    });
+    for (std::uint32_t n = begin; n < end; ++n) append_children(tree, source, n, divisions_[n - begin], parts_);
+    begin = end;
+  }
+  const Parts entries{order.count(), 8192};
+  workers.for_each(entries.parts(), [&](std::size_t part, std::uint32_t) {
+    write_entries(tree, order, entries.begin(part), entries.end(part));
+  });
+  tree.fit(workers, order.boxes(), levels_);
 }
 
 template <class S>

@@ -20,10 +20,18 @@ template <class S>
 class LinearBuilder {
  public:
   void build(BuiltTree<S>& tree, CurveOrder<S>& order, const PrimitiveList& list);
-  std::size_t bytes() const { return parts_.capacity() * sizeof(KeyRange); }
+  /// Builds the same tree on several threads: the sort by parts, the nodes of a level by parts. One thread
+  /// numbers nodes and leaves, and builds small trees alone.
+  void build(Workers& workers, BuiltTree<S>& tree, CurveOrder<S>& order, const PrimitiveList& list);
+  std::size_t bytes() const {
+    return parts_.capacity() * sizeof(KeyRange) + divisions_.capacity() * sizeof(Division<KeyRange>) +
+           levels_.capacity() * sizeof(std::uint32_t);
+  }
 
  private:
   std::vector<KeyRange> parts_;
+  std::vector<Division<KeyRange>> divisions_;  ///< of the nodes of one level
+  std::vector<std::uint32_t> levels_;          ///< the first node of each
 };
 
 /// A tree whose shape depends on the number of primitives only (implicit, as in Chitalu et al. 2020): the

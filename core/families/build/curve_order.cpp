@@ -33,6 +33,36 @@ void CurveOrder<S>::take(const Primitives& primitives, const PrimitiveList& list
 }
 
 template <class S>
+void CurveOrder<S>::take(Workers& workers, const Primitives& primitives, const PrimitiveList& list,
+                         const S* positions, KernelSet kernels) {
+  const Room to = room(primitives.count(), list.count, kernels);
+  if (count_ == 0) return;
+  const Parts cut = parts();
+  if (part_extents_.size() < cut.parts()) part_extents_.resize(cut.parts());
+  workers.for_each(cut.parts(), [&](std::size_t part, std::uint32_t) {
+    const std::size_t first = cut.begin(part);
+    PrimitiveBoxesJob<S> job{primitives.offsets.data(), primitives.vertices.data(), list.corners_each,
+                             list.ids(), std::uint32_t(cut.end(part) - first), positions, to.boxes,
+                             to.centres + first, to.stride, part_extents_[part].of};
+    if (job.living != nullptr) {
+      job.living += first;
+    } else {
+      // The kernel counts from 0.
+      job.offsets += first;
+      job.vertices += first * list.corners_each;
+      job.boxes += 8 * first;
+    }
+    build_kernels<S>(kernels).primitive_boxes(job);
+  });
+  std::copy_n(part_extents_[0].of, 8, extent_);
+  for (std::size_t part = 1; part < cut.parts(); ++part)
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      extent_[axis] = std::min(extent_[axis], part_extents_[part].of[axis]);
+      extent_[axis + 4] = std::max(extent_[axis + 4], part_extents_[part].of[axis + 4]);
+    }
+}
+
+template <class S>
 typename CurveOrder<S>::Room CurveOrder<S>::room(std::uint32_t primitives, std::uint32_t living,
                                                  KernelSet kernels) {
   kernels_ = kernels;
@@ -57,10 +87,7 @@ CurveKeysJob<S> CurveOrder<S>::keys_job(const S* extent) {
 }
 
 template <class S>
-void CurveOrder<S>::sort(const PrimitiveList& list, Curve curve) {
-  curve_ = curve;
-  if (keys_.size() < count_) keys_.resize(count_);
-  if (count_ == 0) return;
+CurveKeysJob<S> CurveOrder<S>::keys_job(const PrimitiveList& list) {
   CurveKeysJob<S> job = keys_job(extent_);
   job.centres = centres_.data();
   job.stride = stride_;
@@ -69,6 +96,36 @@ void CurveOrder<S>::sort(const PrimitiveList& list, Curve curve) {
   job.keys = keys_.data();
   // Cells need not be much smaller than leaves, so one pass can be skipped.
   job.dropped_bits = count_ <= coarse_count ? 8 : 0;
+  return job;
+}
+
+template <class S>
+void CurveOrder<S>::sort(Workers& workers, const PrimitiveList& list, Curve curve) {
+  if (count_ <= few) return sort(list, curve);
+  curve_ = curve;
+  if (keys_.size() < count_) keys_.resize(count_);
+  const Parts cut = parts();
+  const CurveKeysJob<S> all = keys_job(list);
+  workers.for_each(cut.parts(), [&](std::size_t part, std::uint32_t) {
+    const std::size_t first = cut.begin(part);
+    CurveKeysJob<S> job = all;
+    job.centres += first;
+    job.count = std::uint32_t(cut.end(part) - first);
+    job.keys += first;
+    if (job.living != nullptr) job.living += first;
+    build_kernels<S>(kernels_).curve_keys(job);
+    if (job.living != nullptr) return;
+    for (std::uint32_t k = 0; k < job.count; ++k) job.keys[k] += first;  // the kernel counts from 0
+  });
+  radix_.sort(workers, {keys_.data(), count_});
+}
+
+template <class S>
+void CurveOrder<S>::sort(const PrimitiveList& list, Curve curve) {
+  curve_ = curve;
+  if (keys_.size() < count_) keys_.resize(count_);
+  if (count_ == 0) return;
+  CurveKeysJob<S> job = keys_job(list);
   job.histogram = count_ <= few ? nullptr : radix_.counts();
   build_kernels<S>(kernels_).curve_keys(job);
   if (count_ <= few)
@@ -125,7 +182,7 @@ template <class S>
 std::size_t CurveOrder<S>::bytes() const {
   return (boxes_.capacity() + centres_.capacity() + few_centres_.capacity()) * sizeof(S) +
          keys_.capacity() * sizeof(std::uint64_t) + radix_.bytes() + ids_.capacity() * sizeof(std::uint32_t) +
-         runs_.capacity() * sizeof(runs_[0]);
+         runs_.capacity() * sizeof(runs_[0]) + part_extents_.capacity() * sizeof(Extent);
 }
 
 template class CurveOrder<float>;

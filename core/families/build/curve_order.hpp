@@ -7,6 +7,7 @@
 #include "core/families/build/kernels/build_wide.hpp"
 #include "core/families/build/radix_sort.hpp"
 #include "core/families/wide/wide_tree.hpp"
+#include "core/parallel/workers.hpp"
 #include "core/scene/scene.hpp"
 
 namespace kbvh {
@@ -29,6 +30,9 @@ class CurveOrder {
  public:
   /// Computes boxes and centres of all living primitives. O(corners).
   void take(const Primitives& primitives, const PrimitiveList& list, const S* positions, KernelSet kernels);
+  /// Does the same on several threads.
+  void take(Workers& workers, const Primitives& primitives, const PrimitiveList& list, const S* positions,
+            KernelSet kernels);
   /// Boxes and centres of all living primitives, to be written by a caller that makes boxes of its own in
   /// place of `take`: as PrimitiveBoxesJob describes them. `primitives` is the number of ids.
   struct Room {
@@ -39,6 +43,8 @@ class CurveOrder {
   Room room(std::uint32_t primitives, std::uint32_t living, KernelSet kernels);
   /// Sorts the primitives along a curve through the grid over their centres. O(primitives).
   void sort(const PrimitiveList& list, Curve curve);
+  /// Does the same on several threads.
+  void sort(Workers& workers, const PrimitiveList& list, Curve curve);
 
   std::uint32_t count() const { return count_; }
   /// Returns the boxes, [primitive][8]: lower x, y, z, unused, upper x, y, z, unused.
@@ -59,6 +65,11 @@ class CurveOrder {
 
  private:
   CurveKeysJob<S> keys_job(const S* extent);
+  CurveKeysJob<S> keys_job(const PrimitiveList& list);
+  Parts parts() const { return {count_, primitives_at_once}; }
+
+  /// Items of several threads: full rows of centres for the kernels.
+  static constexpr std::size_t primitives_at_once = 4096;
 
   KernelSet kernels_ = KernelSet::portable;
   std::uint32_t count_ = 0;
@@ -66,6 +77,10 @@ class CurveOrder {
   AlignedArray<S> boxes_, centres_;
   std::size_t stride_ = 0;
   S extent_[8] = {};
+  struct alignas(cache_line) Extent {
+    S of[8];
+  };
+  std::vector<Extent> part_extents_;
   std::vector<std::uint64_t> keys_;
   RadixSort radix_;
   // For temporary use by `refine`.

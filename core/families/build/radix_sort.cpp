@@ -39,4 +39,49 @@ void RadixSort::sort(std::span<std::uint64_t> keys) {
   if (from != keys.data()) std::copy_n(from, count, keys.data());
 }
 
+void RadixSort::sort(Workers& workers, std::span<std::uint64_t> keys) {
+  if (buffer_.size() < keys.size()) buffer_.resize(keys.size());
+  std::uint64_t *from = keys.data(), *to = buffer_.data();
+  const std::size_t count = keys.size();
+  // Several parts for each thread, but each of many more keys than there are bins.
+  const std::size_t many = std::size_t(4) * workers.threads();
+  const Parts parts{count, std::max<std::size_t>((count + many - 1) / many, std::size_t(4) * bins)};
+  const std::size_t part_count = parts.parts();
+  if (part_counts_.size() < part_count * bins) part_counts_.resize(part_count * bins);
+  for (std::uint32_t digit = 0; digit < digits && count > 1; ++digit) {
+    const std::uint32_t shift = 32 + digit * digit_bits;
+    workers.for_each(part_count, [&](std::size_t part, std::uint32_t) {
+      std::uint32_t* const places = part_counts_.data() + part * bins;
+      std::fill_n(places, bins, 0U);
+      for (std::size_t i = parts.begin(part); i < parts.end(part); ++i) ++places[from[i] >> shift & (bins - 1)];
+    });
+    // The keys of a bin come part by part, which keeps the sort stable.
+    std::uint32_t sum = 0;
+    bool shared_digit = false;
+    for (std::uint32_t bin = 0; bin < bins; ++bin) {
+      const std::uint32_t before = sum;
+      for (std::size_t part = 0; part < part_count; ++part) {
+        std::uint32_t& place = part_counts_[part * bins + bin];
+        const std::uint32_t in_part = place;
+        place = sum;
+        sum += in_part;
+      }
+      shared_digit = shared_digit || sum - before == count;
+    }
+    if (shared_digit) continue;
+    workers.for_each(part_count, [&](std::size_t part, std::uint32_t) {
+      std::uint32_t* const places = part_counts_.data() + part * bins;
+      for (std::size_t i = parts.begin(part); i < parts.end(part); ++i) {
+        const std::uint64_t key = from[i];
+        to[places[key >> shift & (bins - 1)]++] = key;
+      }
+    });
+    std::swap(from, to);
+  }
+  if (from == keys.data()) return;
+  workers.for_each(part_count, [&](std::size_t part, std::uint32_t) {
+    std::copy(from + parts.begin(part), from + parts.end(part), keys.data() + parts.begin(part));
+  });
+}
+
 }  // namespace kbvh
