@@ -106,6 +106,7 @@ const std::map<std::string, std::vector<Option>> all_options{
       {"--play", Kind::names, "loop.recording"},
       {"--truth-every", Kind::number, "1"},
       {"--iterates", Kind::number, "1"},
+      {"--clip", Kind::free, "out"},
       {"--out", Kind::free, "out"}}},
     {"lab",
      {{"--port", Kind::number, "0"}, {"--folder", Kind::names, "lab"}, {"--study", Kind::names, "out"}}},
