@@ -120,14 +120,9 @@ def table(found: Cells) -> str:
     return f"{markdown(advice.situations(found.cells))}\nMeasured: {found.told}.\n"
 
 
-BEGIN, END = "<!-- advice -->\n", "<!-- /advice -->\n"
-
-
 def inserted(page: str, table: str, place: str) -> str:
     """Returns a page with its table replaced. Raises ResultError for a page without a place for it."""
-    if page.count(BEGIN) != 1 or page.count(END) != 1 or page.index(END) < page.index(BEGIN):
-        raise ResultError(f"{place} should have the lines {BEGIN.strip()} and {END.strip()} once, in this order.")
-    return page.split(BEGIN)[0] + BEGIN + table + END + page.split(END)[1]
+    return files.inserted(page, "<!-- advice -->", "<!-- /advice -->", table, place)
 
 
 def gathered(places: Sequence[Path]) -> Cells:

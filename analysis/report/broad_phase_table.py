@@ -15,7 +15,6 @@ from typing import Any, Optional
 from results import files
 from results.files import ResultError
 
-BEGIN, END = "<!-- broad phase -->\n", "<!-- /broad phase -->\n"
 VERDICTS = ("reported", "missed", "met", "met, and the aim")
 
 
@@ -67,9 +66,7 @@ def table(result: dict[str, Any]) -> str:
 
 def inserted(page: str, rows: str, place: str) -> str:
     """Returns a page with its table replaced. Raises ResultError for a page without a place for it."""
-    if page.count(BEGIN) != 1 or page.count(END) != 1 or page.index(END) < page.index(BEGIN):
-        raise ResultError(f"{place} should have the lines {BEGIN.strip()} and {END.strip()} once, in this order.")
-    return page.split(BEGIN)[0] + BEGIN + rows + END + page.split(END)[1]
+    return files.inserted(page, "<!-- broad phase -->", "<!-- /broad phase -->", rows, place)
 
 
 def main(arguments: Optional[list[str]] = None) -> int:

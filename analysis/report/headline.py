@@ -254,13 +254,9 @@ def inserted(page: str, place: str, all_cases: list[Case]) -> str:
     if not names:
         raise ResultError(f"{place} has no line `<!-- headline NAME -->` with NAME one of {', '.join(TABLES)}.")
     for name in names:
-        begin, end = f"<!-- headline {name} -->\n", f"<!-- /headline {name} -->\n"
         if name not in TABLES:
             raise ResultError(f"{place}: there is no headline table {name}, only {', '.join(TABLES)}.")
-        if page.count(begin) != 1 or page.count(end) != 1 or page.index(end) < page.index(begin):
-            raise ResultError(f"{place}: the lines around the headline table {name} should be there once, in order.")
-        head, rest = page.split(begin)
-        page = head + begin + TABLES[name](all_cases) + end + rest.split(end)[1]
+        page = files.inserted(page, f"<!-- headline {name} -->", f"<!-- /headline {name} -->", TABLES[name](all_cases), place)
     return page
 
 

@@ -228,14 +228,9 @@ def markers(plan: str) -> tuple[str, str]:
     return f"<!-- targets of {plan} -->", f"<!-- /targets of {plan} -->"
 
 
-def rewrite(page: str, plan: str, table: str) -> str:
-    """Returns the page with the plan's table between its markers, each on a line of its own. Raises ValueError without them."""
-    begin, end = markers(plan)
-    if page.count(begin) != 1 or page.count(end) != 1 or page.index(begin) > page.index(end):
-        raise ValueError(f"{begin} and {end} should be there once, in this order")
-    before, rest = page.split(begin)
-    after = rest.split(end)[1]
-    return f"{before}{begin}\n{table}{end}{after}"
+def rewrite(page: str, plan: str, table: str, place: str = "the page") -> str:
+    """Returns the page with the plan's table between its markers, each on a line of its own. Raises ResultError without them."""
+    return files.inserted(page, *markers(plan), table, place)
 
 
 def main(arguments: Optional[list[str]] = None) -> int:
@@ -258,12 +253,12 @@ def main(arguments: Optional[list[str]] = None) -> int:
         print(table, end="")
         return 0
     try:
-        page = rewrite(options.write.read_text(encoding="utf-8"), targets[0].plan if targets else "", table)
+        page = rewrite(options.write.read_text(encoding="utf-8"), targets[0].plan if targets else "", table, str(options.write))
         files.write_whole(options.write, page)
     except OSError as error:
         print(f"targets_table: {error.filename}: {error.strerror}.", file=sys.stderr)
         return 2
-    except ValueError as error:
-        print(f"targets_table: {options.write}: {error}.", file=sys.stderr)
+    except ResultError as error:
+        print(f"targets_table: {error}", file=sys.stderr)
         return 2
     return 0

@@ -54,6 +54,16 @@ def run_command(name: str, expected: tuple[type[Exception], ...], work: Callable
         return code
 
 
+def inserted(page: str, begin: str, end: str, content: str, place: str) -> str:
+    """Returns a page with what stands between two lines replaced by `content`, which ends with a line's end. `place` names the page.
+    Raises ResultError if the lines are not there once, in this order.
+    """
+    begin, end = begin + "\n", end + "\n"
+    if page.count(begin) != 1 or page.count(end) != 1 or page.index(end) < page.index(begin):
+        raise ResultError(f"{place} should have the lines {begin.strip()} and {end.strip()} once, in this order.")
+    return page.split(begin)[0] + begin + content + end + page.split(end)[1]
+
+
 def write_whole(file: Path, content: Union[str, bytes]) -> None:
     """Writes a file under a temporary name and renames it: the old content stays until all is on disk. Raises OSError that
     names the file.

@@ -25,10 +25,10 @@ class TakesMovedVertices {
 };
 
 /// Tells a strategy which vertices of a body will differ, at the next `advance`, from their positions at the
-/// last frame: the listed ones at most. The list is for that frame and replaces one given before; nothing
-/// withdraws it. A list that lacks a vertex makes bounds wrong, which audits show and nothing prevents. Does
-/// nothing for strategies that take no lists; returns whether this one does. Throws std::invalid_argument for
-/// a body or a vertex out of range.
+/// last frame: the listed ones at most. The list is for that frame and replaces one given before;
+/// std::nullopt withdraws it. A list that lacks a vertex makes bounds wrong, which audits show and nothing
+/// prevents. Does nothing for strategies that take no lists; returns whether this one does. Throws
+/// std::invalid_argument for a body or a vertex out of range.
 template <class S>
 bool tell_moved(Strategy<S>& strategy, std::uint32_t body,
                 std::optional<std::span<const std::uint32_t>> vertices) {

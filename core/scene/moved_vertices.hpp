@@ -27,8 +27,8 @@ class MovedVertices : private SampledMotion<S> {
 
   /// Takes the caller's list for the next frame: the vertices of the body, in any order, that will differ
   /// from their positions at the last one. It counts instead of the plans, and replaces one given before;
-  /// nothing withdraws it. Nothing checks it: bounds made with a list that lacks a vertex are wrong. Throws
-  /// std::invalid_argument for a body or a vertex out of range.
+  /// std::nullopt withdraws it. Nothing checks it: bounds made with a list that lacks a vertex are wrong.
+  /// Throws std::invalid_argument for a body or a vertex out of range.
   void tell(std::uint32_t body, std::optional<std::span<const std::uint32_t>> vertices);
   /// Forgets callers' lists: they are for one frame.
   void end_frame();

@@ -50,11 +50,11 @@ class TestTable(unittest.TestCase):
 
     def test_writes_into_a_page(self) -> None:
         page = self.folder / "page.md"
-        content = f"before\n{broad_phase_table.BEGIN}old\n{broad_phase_table.END}after\n"
+        content = "before\n<!-- broad phase -->\nold\n<!-- /broad phase -->\nafter\n"
         page.write_text(content, encoding="utf-8")
         self.assertEqual(self.run_main(RESULT, "--write", str(page)), (0, "", ""))
         self.assertEqual(page.read_text(encoding="utf-8"), content.replace("old\n", self.run_main(RESULT)[1]))
-        for wrong in ("text\n", broad_phase_table.END + broad_phase_table.BEGIN):
+        for wrong in ("text\n", "<!-- /broad phase -->\n<!-- broad phase -->\n"):
             page.write_text(wrong, encoding="utf-8")
             code, _, err = self.run_main(RESULT, "--write", str(page))
             self.assertEqual((code, err.count("\n")), (2, 1))

@@ -127,7 +127,7 @@ class TestWrite(TargetsCase):
             page.write_text(content, encoding="utf-8")
             code, _, err = self.run_main(rows(), "--write", str(page))
             self.assertEqual(code, 2)
-            self.assertIn("should be there once", err)
+            self.assertIn(f"should have the lines {begin} and {end} once, in this order.", err)
             self.assertEqual(page.read_text(encoding="utf-8"), content)
 
     def test_the_page_of_results_has_the_markers(self) -> None:
