@@ -8,9 +8,7 @@
 #include <array>
 #include <cstdio>
 #include <cstdlib>
-#include <ctime>
 #include <filesystem>
-#include <fstream>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
@@ -21,18 +19,13 @@
 #include "core/continuous/impact_batch.hpp"
 #include "core/contract/registry.hpp"
 #include "experiments/common/environment.hpp"
-#include "experiments/common/machine.hpp"
+#include "experiments/micro/turns_table.hpp"
 #include "experiments/study/impact_queries.hpp"
 
 namespace kbvh::experiments {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// The processor's time of this program, which has one thread: other programs disturb it least.
-double seconds() {
-  return double(std::clock()) / CLOCKS_PER_SEC;
-}
 
 /// Pairs of ids of one kind, as they come from a broad phase: a vertex and a face, or two edges.
 struct Pairs {
@@ -125,9 +118,9 @@ class Bench {
                              }});
     for (int r = -1; r < repetitions_; ++r)
       for (Contestant& contestant : contestants) {
-        const double begin = seconds();
+        const double begin = micro::milliseconds();
         contestant.found = contestant.work();
-        if (r >= 0) contestant.times.push_back(seconds() - begin);
+        if (r >= 0) contestant.times.push_back(1e-3 * (micro::milliseconds() - begin));
       }
     const Found &ours = contestants[0].found, &single = contestants[1].found;
     if (ours.touching != single.touching || ours.times != single.times) differs_ = true;
@@ -152,32 +145,16 @@ class Bench {
     comparisons_.push_back(
         {{"pairs", pairs.name}, {"queries", pairs.ids.size()}, {"exact", exact}, {"contestants", rows}});
     for (std::size_t i = 1; i < contestants.size(); ++i)
-      target(pairs.name + ": batches over " + contestants[i].name,
-             contestants[0].per_second / contestants[i].per_second, i == 1 ? 0 : 0.5, i == 1 ? 0 : 1.5);
+      targets_.add(pairs.name + ": batches over " + contestants[i].name,
+                   contestants[0].per_second / contestants[i].per_second, i == 1 ? 0 : 0.5, i == 1 ? 0 : 1.5);
   }
 
   void print_targets() const {
-    std::printf("Targets\n");
-    for (const nlohmann::json& target : targets_)
-      std::printf("  %-70s %7.2f x  (%g, aim %g): %s\n", target["what"].get<std::string>().c_str(),
-                  target["ratio"].get<double>(), target["at_least"].get<double>(),
-                  target["aim"].get<double>(), target["verdict"].get<std::string>().c_str());
+    targets_.print();
     if (peers_.empty()) std::printf("  no peer with a continuous test of its own is built in\n");
   }
   void write(const fs::path& file) const {
-    const nlohmann::json result{{"program", "kbvh_impact_bench"},
-                                {"time", now_utc()},
-                                {"commit", commit()},
-                                {"dirty", dirty()},
-                                {"machine", machine()},
-                                {"kernels", name(active_kernel_set())},
-                                {"repetitions", repetitions_},
-                                {"clock", "processor time, median of repetitions by turns, one thread"},
-                                {"comparisons", comparisons_},
-                                {"targets", targets_}};
-    std::ofstream out(file);
-    out << result.dump(2) << '\n';
-    if (!out.flush()) throw std::runtime_error("cannot write " + file.string());
+    targets_.write(file, "kbvh_impact_bench", repetitions_, comparisons_);
   }
   bool differs() const { return differs_; }
 
@@ -187,19 +164,11 @@ class Bench {
     bool (*touches)(Contact::Kind, const MovingPoints&);
   };
 
-  void target(const std::string& what, double ratio, double at_least, double aim) {
-    const char* const verdict = at_least == 0      ? "reported"
-                                : ratio < at_least ? "missed"
-                                : ratio < aim      ? "met"
-                                                   : "met, and the aim";
-    targets_.push_back(
-        {{"what", what}, {"ratio", ratio}, {"at_least", at_least}, {"aim", aim}, {"verdict", verdict}});
-  }
-
   int repetitions_;
   std::vector<Peer> peers_;
   bool differs_ = false;
-  nlohmann::json comparisons_ = nlohmann::json::array(), targets_ = nlohmann::json::array();
+  nlohmann::json comparisons_ = nlohmann::json::array();
+  micro::RatioTargets targets_;
 };
 
 void compare_frames(const FramePair& frames, Bench& bench) {

@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/kernels/kernel_set.hpp"
@@ -30,6 +31,51 @@ struct Contestant {
   std::function<std::size_t()> work;  ///< returns the number of pairs
   std::vector<double> ms{};
   std::size_t pairs = 0;
+};
+
+/// Ratios of a run next to what is at least asked for and aimed at, and the file that receives them.
+class RatioTargets {
+ public:
+  /// Adds a ratio; `at_least` 0: nothing is asked for. `facts` are further fields of the row.
+  void add(const std::string& what, double ratio, double at_least, double aim,
+           nlohmann::json facts = nlohmann::json::object()) {
+    facts.update({{"what", what},
+                  {"ratio", ratio},
+                  {"at_least", at_least},
+                  {"aim", aim},
+                  {"verdict", at_least == 0      ? "reported"
+                              : ratio < at_least ? "missed"
+                              : ratio < aim      ? "met"
+                                                 : "met, and the aim"}});
+    rows_.push_back(std::move(facts));
+  }
+  void print() const {
+    std::printf("Targets\n");
+    for (const nlohmann::json& row : rows_)
+      std::printf("  %-78s %7.2f x  (%g, aim %g): %s\n", row["what"].get<std::string>().c_str(),
+                  row["ratio"].get<double>(), row["at_least"].get<double>(), row["aim"].get<double>(),
+                  row["verdict"].get<std::string>().c_str());
+  }
+  /// Writes them with what was compared, when, where and by which program. Throws std::runtime_error.
+  void write(const std::filesystem::path& file, const char* program, int repetitions,
+             const nlohmann::json& comparisons, nlohmann::json facts = nlohmann::json::object()) const {
+    facts.update({{"program", program},
+                  {"time", now_utc()},
+                  {"commit", commit()},
+                  {"dirty", dirty()},
+                  {"machine", machine()},
+                  {"kernels", name(active_kernel_set())},
+                  {"repetitions", repetitions},
+                  {"clock", "processor time, median of repetitions by turns, one thread"},
+                  {"comparisons", comparisons},
+                  {"targets", rows_}});
+    std::ofstream out(file);
+    out << facts.dump(2) << '\n';
+    if (!out.flush()) throw std::runtime_error("cannot write " + file.string());
+  }
+
+ private:
+  nlohmann::json rows_ = nlohmann::json::array();
 };
 
 /// What was compared in this run, for the file and for targets.
@@ -69,55 +115,18 @@ class Table {
   void target(const char* what, const std::string& ours, const std::string& rival, double at_least,
               double aim) {
     if (!medians_.contains(ours) || !medians_.contains(rival)) return;
-    const double ratio = medians_.at(rival) / medians_.at(ours);
-    const char* const verdict = at_least == 0      ? "reported"
-                                : ratio < at_least ? "missed"
-                                : ratio < aim      ? "met"
-                                                   : "met, and the aim";
-    targets_.push_back({{"what", what},
-                        {"ours", ours},
-                        {"rival", rival},
-                        {"ratio", ratio},
-                        {"at_least", at_least},
-                        {"aim", aim},
-                        {"verdict", verdict}});
+    targets_.add(what, medians_.at(rival) / medians_.at(ours), at_least, aim,
+                 {{"ours", ours}, {"rival", rival}});
   }
-  void not_measured(const char* what, const char* why) {
-    targets_.push_back({{"what", what}, {"ratio", nullptr}, {"verdict", "not measured"}, {"why", why}});
-  }
-
-  void print_targets() const {
-    std::printf("Targets\n");
-    for (const nlohmann::json& target : targets_) {
-      const std::string what = target["what"], verdict = target["verdict"];
-      if (target["ratio"].is_null())
-        std::printf("  %-78s %s: %s\n", what.c_str(), verdict.c_str(),
-                    target["why"].get<std::string>().c_str());
-      else
-        std::printf("  %-78s %7.2f x  (%g, aim %g): %s\n", what.c_str(), target["ratio"].get<double>(),
-                    target["at_least"].get<double>(), target["aim"].get<double>(), verdict.c_str());
-    }
-  }
+  void print_targets() const { targets_.print(); }
   void write(const std::filesystem::path& file, const std::string& frames, int repetitions) const {
-    const nlohmann::json result{{"program", "kbvh_broad_phase_bench"},
-                                {"time", now_utc()},
-                                {"commit", commit()},
-                                {"dirty", dirty()},
-                                {"machine", machine()},
-                                {"kernels", name(active_kernel_set())},
-                                {"frames", frames},
-                                {"repetitions", repetitions},
-                                {"clock", "processor time, median of repetitions by turns, one thread"},
-                                {"comparisons", comparisons_},
-                                {"targets", targets_}};
-    std::ofstream out(file);
-    out << result.dump(2) << '\n';
-    if (!out.flush()) throw std::runtime_error("cannot write " + file.string());
+    targets_.write(file, "kbvh_broad_phase_bench", repetitions, comparisons_, {{"frames", frames}});
   }
 
  private:
   std::map<std::string, double> medians_;
-  nlohmann::json comparisons_ = nlohmann::json::array(), targets_ = nlohmann::json::array();
+  nlohmann::json comparisons_ = nlohmann::json::array();
+  RatioTargets targets_;
 };
 
 }  // namespace kbvh::experiments::micro
