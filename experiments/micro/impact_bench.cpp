@@ -19,8 +19,8 @@
 #include "core/continuous/impact_batch.hpp"
 #include "core/contract/registry.hpp"
 #include "experiments/common/environment.hpp"
-#include "experiments/micro/turns_table.hpp"
 #include "experiments/study/impact_queries.hpp"
+#include "turns_table.hpp"
 
 namespace kbvh::experiments {
 namespace {
