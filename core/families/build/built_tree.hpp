@@ -5,6 +5,7 @@
 
 #include "core/families/build/kernels/build_wide.hpp"
 #include "core/families/wide/wide_tree.hpp"
+#include "core/parallel/workers.hpp"
 #include "core/topology/topology.hpp"
 
 namespace kbvh {
@@ -33,6 +34,9 @@ class BuiltTree : public WideTree<S> {
   /// Computes all boxes from those of the primitives, [primitive][8]: lower x, y, z, unused, upper x, y, z,
   /// unused.
   void fit(const S* primitive_boxes);
+  /// Does the same on the threads of `workers`: leaves first, then level by level up to the root. The nodes
+  /// of a level must have consecutive numbers, in the order of their parents.
+  void fit(Workers& workers, const S* primitive_boxes);
 
   /// Returns the boxes of the leaves, [leaf][8], like those of primitives: `fit` computes them.
   S* leaf_boxes() { return leaf_boxes_.data(); }
@@ -40,12 +44,84 @@ class BuiltTree : public WideTree<S> {
   /// Returns the tree as a topology, and the box of each node: for audits.
   Topology topology(std::vector<Box<double>>& boxes) const;
 
-  std::size_t bytes() const { return this->tree_bytes() + leaf_boxes_.capacity() * sizeof(S); }
+  std::size_t bytes() const {
+    return this->tree_bytes() + leaf_boxes_.capacity() * sizeof(S) + levels_.capacity() * sizeof(levels_[0]);
+  }
 
  private:
+  /// Makes room for all boxes.
+  void grow();
+  /// Lists the first node of each level, and the number of nodes.
+  void find_levels();
+  /// Computes the rows and boxes of the leaves [begin, end).
+  void fit_leaves(const S* primitive_boxes, std::uint32_t begin, std::uint32_t end);
+
   std::uint32_t leaves_ = 0;
   AlignedArray<S> leaf_boxes_;
+  std::vector<std::uint32_t> levels_;  ///< for temporary use by `fit`
 };
+
+/// The children of a node: parts, of which those with a weight below 0 are leaves.
+template <class Part>
+struct Division {
+  static constexpr std::uint32_t most = 8;
+  std::array<Part, most> parts;
+  std::array<double, most> weights;
+  std::uint32_t count = 0;
+};
+
+/// Memory for temporary use by `lay_out` on several threads.
+template <class Part>
+struct LayOutRoom {
+  std::vector<Part> parts;                ///< of all nodes
+  std::vector<Division<Part>> divisions;  ///< of the nodes of one level
+  std::size_t bytes() const {
+    return parts.capacity() * sizeof(Part) + divisions.capacity() * sizeof(Division<Part>);
+  }
+};
+
+/// Divides a part into the children of a node: see `lay_out`.
+template <class Source, class Part>
+void divide(Source& source, std::uint32_t leaf_size, const Part& whole, Division<Part>& to) {
+  const auto put = [&](std::uint32_t place, const Part& part) {
+    to.parts[place] = part;
+    to.weights[place] = source.count(part) <= leaf_size ? -1.0 : source.weight(part);
+  };
+  to.count = 1;
+  put(0, whole);
+  while (to.count < Division<Part>::most) {
+    std::uint32_t heaviest = 0;
+    for (std::uint32_t c = 1; c < to.count; ++c)
+      if (to.weights[c] > to.weights[heaviest]) heaviest = c;
+    if (to.weights[heaviest] < 0) break;
+    const auto [first, second] = source.split(to.parts[heaviest]);
+    put(heaviest, first);
+    put(to.count++, second);
+  }
+}
+
+/// Sets node n, adds its leaves to the tree, and appends its other children: to the tree, and to `parts`, the
+/// parts of all nodes.
+template <class S, class Source, class Part>
+void append_children(BuiltTree<S>& tree, Source& source, std::uint32_t n, const Division<Part>& division,
+                     std::vector<Part>& parts) {
+  const std::uint32_t count = division.count;
+  WideNode node;
+  node.first_leaf = tree.leaf_count();
+  node.count = std::uint8_t(count);
+  for (std::uint32_t c = 0; c < count; ++c)
+    if (division.weights[c] < 0) {
+      const auto [begin, end] = source.leaf(division.parts[c]);
+      tree.add_leaf(begin, end);
+      ++node.leaf_count;
+    }
+  if (node.leaf_count != count) node.first_child = tree.add_nodes(count - node.leaf_count);
+  if (parts.size() < tree.node_count()) parts.resize(tree.node_count());
+  std::uint32_t next = node.first_child;
+  for (std::uint32_t c = 0; c < count; ++c)
+    if (division.weights[c] >= 0) parts[next++] = division.parts[c];
+  tree.node(n) = node;
+}
 
 /// A binary tree that a builder makes from above, laid out with 8 children per node: a node takes the two
 /// children of its binary node, then repeatedly replaces the heaviest child that is not a leaf by that
@@ -59,46 +135,46 @@ class BuiltTree : public WideTree<S> {
 template <class S, class Source>
 void lay_out(BuiltTree<S>& tree, Source& source, const typename Source::Part& root,
              std::vector<typename Source::Part>& parts) {
-  using Part = typename Source::Part;
+  const std::uint32_t first = tree.add_nodes(1);
+  if (parts.size() <= first) parts.resize(first + 1);
+  parts[first] = root;
+  Division<typename Source::Part> division{};
+  for (std::uint32_t n = first; n < tree.node_count(); ++n) {
+    divide(source, tree.leaf_size(), parts[n], division);
+    append_children(tree, source, n, division, parts);
+  }
+}
+
+/// Lays out the same tree on the threads of `workers`, level by level: threads divide the nodes of a level,
+/// then the caller's thread numbers their children. Beyond the above, `Source` has
+///   nodes_at_once      nodes that a thread divides at once
+///   large(part)        whether the caller's thread divides the part before the others: `split` may then
+///   share
+///                      the work of one part
+/// Each thread divides with a copy of `source`; only the caller's thread calls `leaf`.
+template <class S, class Source>
+void lay_out(Workers& workers, BuiltTree<S>& tree, Source& source, const typename Source::Part& root,
+             LayOutRoom<typename Source::Part>& room) {
+  auto& parts = room.parts;
+  if (!workers.several()) return lay_out(tree, source, root, parts);
   const std::uint32_t leaf_size = tree.leaf_size();
-  const auto is_leaf = [&](const Part& part) { return source.count(part) <= leaf_size; };
-  const auto keep = [&](std::uint32_t node, const Part& part) {
-    if (parts.size() <= node) parts.resize(node + 1);
-    parts[node] = part;
-  };
-  keep(tree.add_nodes(1), root);
-  for (std::uint32_t n = 0; n < tree.node_count(); ++n) {
-    std::array<Part, BuiltTree<S>::most_children> children;
-    std::array<double, BuiltTree<S>::most_children> weights;
-    const auto put = [&](std::uint32_t place, const Part& part) {
-      children[place] = part;
-      weights[place] = is_leaf(part) ? -1.0 : source.weight(part);
-    };
-    std::uint32_t count = 1;
-    put(0, parts[n]);
-    while (count < BuiltTree<S>::most_children) {
-      std::uint32_t heaviest = 0;
-      for (std::uint32_t c = 1; c < count; ++c)
-        if (weights[c] > weights[heaviest]) heaviest = c;
-      if (weights[heaviest] < 0) break;
-      const auto [first, second] = source.split(children[heaviest]);
-      put(heaviest, first);
-      put(count++, second);
-    }
-    WideNode node;
-    node.first_leaf = tree.leaf_count();
-    node.count = std::uint8_t(count);
-    for (std::uint32_t c = 0; c < count; ++c)
-      if (weights[c] < 0) {
-        const auto [begin, end] = source.leaf(children[c]);
-        tree.add_leaf(begin, end);
-        ++node.leaf_count;
-      }
-    if (node.leaf_count != count) node.first_child = tree.add_nodes(count - node.leaf_count);
-    std::uint32_t next = node.first_child;
-    for (std::uint32_t c = 0; c < count; ++c)
-      if (weights[c] >= 0) keep(next++, children[c]);
-    tree.node(n) = node;
+  std::uint32_t begin = tree.add_nodes(1);
+  if (parts.size() <= begin) parts.resize(begin + 1);
+  parts[begin] = root;
+  while (begin < tree.node_count()) {
+    const std::uint32_t end = tree.node_count();
+    const Parts nodes{end - begin, Source::nodes_at_once};
+    if (room.divisions.size() < nodes.count) room.divisions.resize(nodes.count);
+    for (std::uint32_t n = begin; n < end; ++n)
+      if (source.large(parts[n])) divide(source, leaf_size, parts[n], room.divisions[n - begin]);
+    workers.for_each(nodes.parts(), [&](std::size_t item, std::uint32_t) {
+      Source own(source);
+      for (std::size_t i = nodes.begin(item); i < nodes.end(item); ++i)
+        if (!own.large(parts[begin + i])) divide(own, leaf_size, parts[begin + i], room.divisions[i]);
+    });
+    for (std::uint32_t n = begin; n < end; ++n)
+      append_children(tree, source, n, room.divisions[n - begin], parts);
+    begin = end;
   }
 }
 
