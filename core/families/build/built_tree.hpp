@@ -148,9 +148,8 @@ void lay_out(BuiltTree<S>& tree, Source& source, const typename Source::Part& ro
 /// Lays out the same tree on the threads of `workers`, level by level: threads divide the nodes of a level,
 /// then the caller's thread numbers their children. Beyond the above, `Source` has
 ///   nodes_at_once      nodes that a thread divides at once
-///   large(part)        whether the caller's thread divides the part before the others: `split` may then
-///   share
-///                      the work of one part
+///   large(part)        whether the caller's thread divides the part, before the others; its `split` may then
+///                      use all threads
 /// Each thread divides with a copy of `source`; only the caller's thread calls `leaf`.
 template <class S, class Source>
 void lay_out(Workers& workers, BuiltTree<S>& tree, Source& source, const typename Source::Part& root,
