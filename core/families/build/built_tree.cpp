@@ -25,16 +25,14 @@ void BuiltTree<S>::clear(std::uint32_t primitives) {
 }
 
 template <class S>
-void BuiltTree<S>::add_leaf(std::uint32_t begin, std::uint32_t end) {
-  KBVH_ASSERT(begin < end && end - begin <= this->leaf_size_);
-  if (this->first_entry_.size() <= leaves_) {
-    this->first_entry_.push_back(begin);
-    this->end_entry_.push_back(end);
-  } else {
-    this->first_entry_[leaves_] = begin;
-    this->end_entry_[leaves_] = end;
+std::uint32_t BuiltTree<S>::add_leaves(std::uint32_t count) {
+  const std::uint32_t first = leaves_;
+  leaves_ += count;
+  if (this->first_entry_.size() < leaves_) {
+    this->first_entry_.resize(leaves_);
+    this->end_entry_.resize(leaves_);
   }
-  ++leaves_;
+  return first;
 }
 
 template <class S>

@@ -22,17 +22,18 @@ struct ClusterSource {
   static constexpr std::size_t nodes_at_once = 32;
   const std::vector<Cluster>& clusters;
   std::vector<Leaf>& leaves;
-  std::uint32_t placed = 0;
 
   static bool large(Part /*part*/) { return false; }
   std::uint32_t count(Part part) const { return clusters[part].primitives; }
+  std::uint32_t size(Part part) const { return clusters[part].primitives; }
   double weight(Part part) const { return clusters[part].surface; }
   std::pair<Part, Part> split(Part part) const { return {clusters[part].first, clusters[part].second}; }
-  std::pair<std::uint32_t, std::uint32_t> leaf(Part part) {
-    const std::uint32_t begin = placed;
-    placed += count(part);
-    leaves.push_back({part, begin});
-    return {begin, placed};
+  void expect(std::uint32_t count_of_leaves) const {
+    if (leaves.size() < count_of_leaves) leaves.resize(count_of_leaves);
+  }
+  std::pair<std::uint32_t, std::uint32_t> leaf(std::uint32_t number, Part part, std::uint32_t placed) const {
+    leaves[number] = {part, placed};
+    return {placed, placed + size(part)};
   }
 };
 
@@ -48,10 +49,9 @@ void LocalClusterBuilder<S>::build(Workers& workers, BuiltTree<S>& tree, CurveOr
   grains_.take(workers, order, std::min(grain_, tree.leaf_size()));
   start(workers, grains_.count());
   merge_all(workers, tree.kernels());
-  leaves_.clear();
   ClusterSource<Cluster, Leaf> source{clusters_, leaves_};
   lay_out(workers, tree, source, ids_[0], room_);
-  const Parts leaves{leaves_.size(), 256};
+  const Parts leaves{tree.leaf_count(), 256};
   workers.for_each(leaves.parts(), [&](std::size_t part, std::uint32_t) {
     for (std::size_t leaf = leaves.begin(part); leaf < leaves.end(part); ++leaf)
       write(order, leaves_[leaf], tree.entries());
@@ -284,17 +284,24 @@ struct BinnedSource {
   Workers& workers;
   std::vector<Leaf>& leaves;
   std::vector<Bins>& part_bins;
-  std::uint32_t placed = 0;
   Bins bins{};
 
   bool large(const Part& part) const { return workers.several() && part.end - part.begin > most_alone; }
   std::uint32_t count(const Part& part) const { return (part.end - part.begin) * grains.size(); }
+  /// Only the last grain may have fewer primitives.
+  std::uint32_t size(const Part& part) const {
+    std::uint32_t sum = 0;
+    for (std::uint32_t k = part.begin; k < part.end; ++k) sum += grains.primitives(items[k]);
+    return sum;
+  }
   static double weight(const Part& part) { return surface(part.box); }
-  std::pair<std::uint32_t, std::uint32_t> leaf(const Part& part) {
-    const std::uint32_t begin = placed;
-    for (std::uint32_t k = part.begin; k < part.end; ++k) placed += grains.primitives(items[k]);
-    leaves.push_back({part.begin, part.end, begin});
-    return {begin, placed};
+  void expect(std::uint32_t count_of_leaves) const {
+    if (leaves.size() < count_of_leaves) leaves.resize(count_of_leaves);
+  }
+  std::pair<std::uint32_t, std::uint32_t> leaf(std::uint32_t number, const Part& part,
+                                               std::uint32_t placed) const {
+    leaves[number] = {part.begin, part.end, placed};
+    return {placed, placed + size(part)};
   }
   std::pair<Part, Part> split(const Part& part) {
     BinsJob job{grains.boxes(),       items + part.begin, part.end - part.begin, {}, {},
@@ -408,11 +415,10 @@ void BinnedBuilder<S>::build(Workers& workers, BuiltTree<S>& tree, CurveOrder<S>
   order.refine_runs(workers, tree.leaf_size());
   grains_.take(workers, order, std::min(grain_, tree.leaf_size()));
   const Part root = take_items(workers);
-  leaves_.clear();
   BinnedSource<S> source{grains_, items_.data(), cluster_kernels(tree.kernels()),
                          workers, leaves_,       part_bins_};
   lay_out(workers, tree, source, root, room_);
-  const Parts leaves{leaves_.size(), 256};
+  const Parts leaves{tree.leaf_count(), 256};
   workers.for_each(leaves.parts(), [&](std::size_t part, std::uint32_t) {
     for (std::size_t i = leaves.begin(part); i < leaves.end(part); ++i) {
       const Leaf& leaf = leaves_[i];

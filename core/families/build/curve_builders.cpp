@@ -19,8 +19,13 @@ struct CellSource {
 
   static bool large(const Part& /*part*/) { return false; }
   static std::uint32_t count(const Part& part) { return part.end - part.begin; }
+  static std::uint32_t size(const Part& part) { return count(part); }
   static double weight(const Part& part) { return count(part); }
-  static std::pair<std::uint32_t, std::uint32_t> leaf(const Part& part) { return {part.begin, part.end}; }
+  static void expect(std::uint32_t /*leaves*/) {}
+  static std::pair<std::uint32_t, std::uint32_t> leaf(std::uint32_t /*number*/, const Part& part,
+                                                      std::uint32_t /*placed*/) {
+    return {part.begin, part.end};
+  }
   std::pair<Part, Part> split(const Part& part) {
     const std::uint32_t middle = middle_of(part);
     return {{part.begin, middle}, {middle, part.end}};
@@ -65,8 +70,9 @@ void lay_out_evenly(BuiltTree<S>& tree, std::uint32_t primitives) {
   const auto share = [](std::uint32_t i, std::uint32_t parts, std::uint32_t whole) {
     return std::uint32_t(std::uint64_t(i) * whole / parts);
   };
+  tree.add_leaves(leaves);
   for (std::uint32_t leaf = 0; leaf < leaves; ++leaf)
-    tree.add_leaf(share(leaf, leaves, primitives), share(leaf + 1, leaves, primitives));
+    tree.set_leaf(leaf, share(leaf, leaves, primitives), share(leaf + 1, leaves, primitives));
   std::array<std::uint32_t, 32> level{leaves};  // number of nodes, from the leaves up
   std::uint32_t top = 0;
   do {

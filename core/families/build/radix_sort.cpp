@@ -49,6 +49,8 @@ void RadixSort::sort(Workers& workers, std::span<std::uint64_t> keys) {
   const Parts parts{count, std::max<std::size_t>((count + wanted - 1) / wanted, std::size_t(2) * bins)};
   const std::size_t part_count = parts.parts();
   if (part_counts_.size() < 2 * part_count * bins) part_counts_.resize(2 * part_count * bins);
+  bin_places_.resize(bins);
+  const Parts ranges{bins, bins / 8};
   const auto counts_of = [this](std::size_t part) { return part_counts_.data() + 2 * part * bins; };
   for (std::uint32_t digit = 0; digit < digits && count > 1; ++digit) {
     const std::uint32_t shift = 32 + digit * digit_bits;
@@ -66,19 +68,34 @@ void RadixSort::sort(Workers& workers, std::span<std::uint64_t> keys) {
       if (i < end) ++at[bin_of(from[i])];
     });
     // The keys of a bin come part by part, which keeps the sort stable.
+    workers.for_each(ranges.parts(), [&](std::size_t range, std::uint32_t) {
+      const std::size_t first = ranges.begin(range), last = ranges.end(range);
+      std::fill(bin_places_.begin() + std::ptrdiff_t(first), bin_places_.begin() + std::ptrdiff_t(last), 0U);
+      for (std::size_t part = 0; part < part_count; ++part) {
+        const std::uint32_t* const at = counts_of(part);
+        for (std::size_t bin = first; bin < last; ++bin) bin_places_[bin] += at[bin] + at[bins + bin];
+      }
+    });
     std::uint32_t sum = 0;
     bool shared_digit = false;
-    for (std::uint32_t bin = 0; bin < bins; ++bin) {
-      const std::uint32_t before = sum;
-      for (std::size_t part = 0; part < part_count; ++part) {
-        std::uint32_t* const at = counts_of(part) + bin;
-        const std::uint32_t in_part = at[0] + at[bins];
-        at[0] = sum;
-        sum += in_part;
-      }
-      shared_digit = shared_digit || sum - before == count;
+    for (std::uint32_t& place : bin_places_) {
+      const std::uint32_t in_bin = place;
+      shared_digit = shared_digit || in_bin == count;
+      place = sum;
+      sum += in_bin;
     }
     if (shared_digit) continue;
+    workers.for_each(ranges.parts(), [&](std::size_t range, std::uint32_t) {
+      const std::size_t first = ranges.begin(range), last = ranges.end(range);
+      for (std::size_t part = 0; part < part_count; ++part) {
+        std::uint32_t* const at = counts_of(part);
+        for (std::size_t bin = first; bin < last; ++bin) {
+          const std::uint32_t in_part = at[bin] + at[bins + bin];
+          at[bin] = bin_places_[bin];
+          bin_places_[bin] += in_part;
+        }
+      }
+    });
     workers.for_each(part_count, [&](std::size_t part, std::uint32_t) {
       std::uint32_t* const places = counts_of(part);
       for (std::size_t i = parts.begin(part); i < parts.end(part); ++i) {

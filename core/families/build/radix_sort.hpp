@@ -20,17 +20,19 @@ class RadixSort {
   /// that all keys share. O(keys).
   void sort(std::span<std::uint64_t> keys);
   /// Sorts `keys` to the same order on the threads of `workers`, a part of the keys each; counts their digits
-  /// itself. O(keys) on all threads together, and O(threads) on one.
+  /// itself. O(keys) on all threads together.
   void sort(Workers& workers, std::span<std::uint64_t> keys);
 
   std::size_t bytes() const {
-    return (counts_.capacity() + part_counts_.capacity()) * sizeof(std::uint32_t) +
+    return (counts_.capacity() + part_counts_.capacity() + bin_places_.capacity()) * sizeof(std::uint32_t) +
            buffer_.capacity() * sizeof(std::uint64_t);
   }
 
  private:
   std::vector<std::uint32_t> counts_;
+  // Of several threads: counts by part of the keys, and the place of a bin's first key.
   std::vector<std::uint32_t> part_counts_;  ///< [part][2][bin]
+  std::vector<std::uint32_t> bin_places_;   ///< [bin]
   std::vector<std::uint64_t> buffer_;
 };
 
