@@ -107,7 +107,7 @@ TreeHash hash_of(BuiltTree<S>& tree) {
     const auto entries = tree.leaf_primitives(leaf);
     leaves.mix(entries.size());
     leaves.bytes(entries.data(), entries.size_bytes());
-    leaves.mix(current.stamps[leaf] == current.stamp ? 1 : 0);
+    leaves.mix(current.stamps[leaf] == current.stamp ? 1U : 0U);
     add_box(leaves, tree.leaf_boxes() + std::size_t(8) * leaf);
   }
   const std::size_t padded = tree.padded_leaf_size();
