@@ -256,12 +256,15 @@ struct Halves {
   using Part = KeyRange;
   std::uint32_t shortened = 0;
   static std::uint32_t count(const Part& part) { return part.end - part.begin; }
+  static std::uint32_t size(const Part& part) { return count(part); }
   static double weight(const Part& part) { return count(part); }
+  static void expect(std::uint32_t /*leaves*/) {}
   static std::pair<Part, Part> split(const Part& part) {
     const std::uint32_t middle = part.begin + count(part) / 2;
     return {{part.begin, middle}, {middle, part.end}};
   }
-  std::pair<std::uint32_t, std::uint32_t> leaf(const Part& part) {
+  std::pair<std::uint32_t, std::uint32_t> leaf(std::uint32_t /*number*/, const Part& part,
+                                               std::uint32_t /*placed*/) {
     return {part.begin, part.end - (shortened-- == 1 ? 1 : 0)};
   }
 };
