@@ -7,8 +7,8 @@
 namespace kbvh {
 
 /// Changes of the answers of several strategies, one of which answers at a time. A strategy that has become
-/// active since the last answer begins all its pairs; these are compared with the pairs that its predecessor
-/// reported.
+/// active since the last answer is asked for all its pairs; these are compared with the pairs that its
+/// predecessor reported.
 template <class S>
 class ChangesOfMany {
  public:
@@ -30,7 +30,15 @@ class ChangesOfMany {
       strategy.changes_at(t, answer, begun, ended);
     } else {
       reported.current = true;
-      strategy.changes_at(t, answer, now_, none_);
+      // Its own last answer may be old: what it reports brings it up to date, and is not used.
+      strategy.changes_at(t, answer, begun, ended);
+      begun.clear();
+      ended.clear();
+      now_.clear();
+      if (answer == Answer::pairs)
+        strategy.pairs_at(t, now_);
+      else
+        strategy.candidates_at(t, now_, {});
       before_.clear();
       reported.pairs.append_to(before_);
       difference_.find(before_, now_, begun, ended);
@@ -52,7 +60,7 @@ class ChangesOfMany {
     bool current = false;  ///< from the currently active strategy
   };
   Reported reported_[2];  // [Answer]
-  PairBuffer now_, none_, before_;
+  PairBuffer now_, before_;
   PairDifference difference_;
 };
 
