@@ -9,12 +9,12 @@ namespace kbvh {
 /// What is known about a scene and its refit. Counts and plans, never times; work in nanoseconds.
 struct Observed {
   double reads = 0, primitives = 0, bodies = 0;  ///< vertices that a refit reads; of moving bodies
-  double refit = 0;                              ///< work of the cheapest refit in a frame
-  double box_tests = 0, pairs = 0;               ///< of the last frame of leaf_slabs: box tests, candidates
-  double frames = 1;                             ///< per segment of the plans
-  double changes_per_frame = 0;   ///< frames with changes of plans, as a share of the last frames
-  double growth = 1, ageing = 0;  ///< of refitted boxes: surfaces over those at the start; search per frame
-  bool translates = false;        ///< all vertices of a body move alike
+  double refit = 0;                              ///< estimated work of the cheapest refit in a frame
+  double box_tests = 0, pairs = 0;  ///< of leaf_slabs in a frame: box tests, candidates; follow contacts
+  double frames = 1;                ///< per segment of the plans
+  double changes_per_frame = 0;     ///< frames with changes of plans, as a share of the last frames
+  double growth = 1, ageing = 0;    ///< of refitted boxes: surfaces over those at the start; tests per frame
+  bool translates = false;          ///< all vertices of a body move alike
 };
 
 /// What a candidate answers at once.
@@ -25,12 +25,11 @@ enum class ChoiceUnit : std::uint8_t {
 };
 constexpr int frames_of_unit = 8;
 
-/// Work that costs the same in all candidates, in nanoseconds.
+/// Work beyond the columns of the table, in nanoseconds.
 struct ChoicePrices {
-  static constexpr double frame = 1000;     ///< the calls of a frame
-  static constexpr double span_test = 45;   ///< two triangles decided for a span of time
-  static constexpr double frame_test = 60;  ///< two triangles of a join at one frame: six positions are made
-  static constexpr double fetch = 3.3;      ///< one of these positions
+  static constexpr double span_test = 34;   ///< two triangles of a join decided for a span of time
+  static constexpr double frame_test = 54;  ///< two triangles of a join at one frame
+  static constexpr double fetch = 3.4;      ///< a position that they fetch
   /// Starting a candidate, per primitive: its hierarchy comes from memory, about 250 bytes at 25 GB/s.
   static constexpr double start = 10;
 };
@@ -44,17 +43,16 @@ struct ChoiceCandidate {
   const char* id;
   std::map<std::string, std::string> params;
   ChoiceUnit unit;
+  double frame;     ///< a frame, whatever happens in it
   double read;      ///< a vertex that a refit reads: in a frame, or once for a segment
   double body;      ///< a moving body: in a frame, or once for a segment
   double box_test;  ///< of its search, in a frame or once for a segment
   double pair;      ///< a candidate pair, with its exact test
   double build;     ///< a primitive in the build of a tree; 0: no trees are built
-  Prediction (*predict)(const Observed&, const ChoiceCandidate&);  ///< null: like a refit, at best half
+  Prediction (*predict)(const Observed&, const ChoiceCandidate&);
 
   /// Returns the work of an update, without the search.
-  double update(const Observed& seen) const {
-    return ChoicePrices::frame + body * seen.bodies + read * seen.reads;
-  }
+  double update(const Observed& seen) const { return frame + body * seen.bodies + read * seen.reads; }
 };
 
 /// Returns the candidates. To add a candidate, add a line: any registered strategy is suitable that follows

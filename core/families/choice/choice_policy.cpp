@@ -9,6 +9,7 @@ namespace {
 constexpr double unlimited = std::numeric_limits<double>::infinity();
 constexpr double frame_ages = 1.0 / 256;  ///< change of what is observed that a frame counts as
 constexpr double recent = 0.25;           ///< age up to which an estimate needs no trial
+constexpr double forgets = 4;             ///< change of contacts beyond which a prediction knows more
 constexpr double few_contacts = 16;       ///< below this many, changes of contacts count less
 constexpr int lasts = 32;                 ///< frames that a choice usually lasts, at least
 }  // namespace
@@ -26,25 +27,18 @@ void ChoicePolicy::start_over() {
 
 double ChoicePolicy::estimate(std::size_t candidate) const {
   const Candidate& one = candidates_[candidate];
-  const double ratio = contacts_ / one.contacts;
+  if (!one.known) return unlimited;
+  const Offer& offer = offers_[candidate];
+  const double work = one.frame + one.search / std::max(1, offer.whole), fixed = std::min(offer.fixed, work),
+               ratio = contacts_ / one.contacts;
   // With fewer contacts, the search becomes less of a work, but does not vanish.
-  return one.known ? one.fixed + one.varying * std::max(ratio, (1 + ratio) / 2) : unlimited;
+  return fixed + (work - fixed) * std::max(ratio, (1 + ratio) / 2);
 }
 
-/// Returns how much of what was observed has changed since a candidate's work was counted.
-double ChoicePolicy::age(const Candidate& candidate) const {
-  const double ratio = contacts_ / candidate.contacts;
-  return changes_ - candidate.changes + std::max(ratio, 1 / ratio) - 1;
-}
-/// Returns the work of a known candidate at best: contacts have not made it more, and other changes have made
-/// it less, unless it has lost trials since.
-double ChoicePolicy::hoped(std::size_t candidate) const {
-  const Candidate& one = candidates_[candidate];
-  const double ratio = contacts_ / one.contacts;
-  // Trials that were lost with a quarter of the contacts, or four times as many, do not count.
-  const int lost = std::max(ratio, 1 / ratio) > 4 ? 0 : one.lost;
-  return std::min(estimate(candidate), one.fixed + one.varying) /
-         (1 + std::ldexp(changes_ - one.changes, -lost));
+/// Returns by what factor the number of contacts has changed since a candidate's work was counted, up or
+/// down.
+double ChoicePolicy::change_of_contacts(const Candidate& candidate) const {
+  return std::max(contacts_ / candidate.contacts, candidate.contacts / contacts_);
 }
 
 double ChoicePolicy::charge() const {
@@ -61,7 +55,7 @@ std::size_t ChoicePolicy::next(std::span<const Offer> offers) {
 void ChoicePolicy::worked(double work, double contacts) {
   all_work_ += work;
   unit_work_ += work;
-  ++answered_;
+  if (++answered_ == 1) first_work_ = unit_work_;
   changes_ += frame_ages;
   // Candidates differ in the contacts that they report, so frames of different ones are not compared.
   if (found_ >= 0 && last_ == active_)
@@ -79,7 +73,8 @@ std::size_t ChoicePolicy::stopped(double work) {
   all_work_ += work;
   unit_work_ += work;
   transition(Event::limit_reached);
-  const bool can = incumbent_ != active_ && offers_[incumbent_].frames > 0;
+  // In the middle of a unit of several frames, its search would not pay.
+  const bool can = incumbent_ != active_ && offers_[incumbent_].frames == 1 && offers_[incumbent_].whole == 1;
   begin(can ? incumbent_ : refit, ChoiceState::stopped);
   --left_;
   return active_;
@@ -96,9 +91,10 @@ void ChoicePolicy::transition(Event event) {
       begin(next, next == incumbent_ ? ChoiceState::stays : ChoiceState::tries);
       return;
     }
-    case Event::unit_done:
-      // The search of a segment serves all its frames, also those before the candidate began.
-      learn(unit_work_ / std::max(offers_[active_].whole, answered_), offers_[active_].fixed);
+    case Event::unit_done: {
+      const double later = answered_ > 1 ? (unit_work_ - first_work_) / (answered_ - 1) : unit_work_,
+                   frame = std::min(later, unit_work_ / answered_);
+      learn(frame, unit_work_ - answered_ * frame);
       if (state_ != ChoiceState::tries) break;
       // The change is made already, so it need not be worth another one.
       if (estimate(active_) < stay_) {
@@ -108,6 +104,7 @@ void ChoicePolicy::transition(Event event) {
         ++active.lost;
       }
       break;
+    }
     case Event::limit_reached:
       // Half done at the limit, so it would take at least as much again.
       learn(2 * std::max(unit_work_ / std::max(offers_[active_].whole, 1), estimate(refit)), 0);
@@ -140,11 +137,11 @@ void ChoicePolicy::begin(std::size_t candidate, ChoiceState state) {
   }
 }
 
-/// Takes the work of a frame as the active candidate's estimate.
-void ChoicePolicy::learn(double per_frame, double fixed) {
+/// Takes what was counted as the active candidate's estimate.
+void ChoicePolicy::learn(double frame, double search) {
   Candidate& one = candidates_[active_];
-  one.fixed = std::min(fixed, per_frame);
-  one.varying = per_frame - one.fixed;
+  one.frame = frame;
+  one.search = search;
   one.contacts = contacts_;
   one.changes = changes_;
   one.known = true;
@@ -166,10 +163,13 @@ void ChoicePolicy::settle() {
 std::size_t ChoicePolicy::best_known() const {
   std::size_t best = incumbent_;
   if (offers_[best].frames == 0 || estimate(best) > estimate(refit)) best = refit;
-  for (std::size_t i = 0; i < candidates_.size(); ++i)
-    if (offers_[i].frames > 0 && candidates_[i].known && age(candidates_[i]) <= recent &&
+  for (std::size_t i = 0; i < candidates_.size(); ++i) {
+    const Candidate& one = candidates_[i];
+    const double age = changes_ - one.changes + change_of_contacts(one) - 1;
+    if (offers_[i].frames > 0 && one.known && age <= recent &&
         estimate(i) * settings_.gain < estimate(best))
       best = i;
+  }
   return best;
 }
 
@@ -188,8 +188,9 @@ std::size_t ChoicePolicy::challenger() {
     Candidate& one = candidates_[i];
     const Offer& offer = offers_[i];
     if (i == incumbent_ || offer.frames == 0) continue;
-    const double expected = one.known ? estimate(i) : offer.expected;
-    const double hoped = one.known ? this->hoped(i) : offer.hoped;
+    const bool counts = one.known && change_of_contacts(one) <= forgets;
+    const double expected = counts ? estimate(i) : offer.expected,
+                 hoped = counts ? expected / (1 + std::ldexp(changes_ - one.changes, -one.lost)) : offer.hoped;
     if (!(hoped < stay / settings_.gain)) continue;
     one.regret += (stay - hoped) * answered_;
     const double cost = offer.change + offers_[incumbent_].change + (expected - stay) * offer.frames;

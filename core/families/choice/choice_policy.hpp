@@ -9,7 +9,7 @@ namespace kbvh {
 
 /// What is known about a candidate before a frame. Work is in nanoseconds computed from counts.
 struct Offer {
-  double expected = 0;  ///< predicted work per frame, until its first unit has been counted
+  double expected = 0;  ///< predicted work per frame, where no count is known
   double hoped = 0;     ///< the same at best; at most `expected`
   double fixed = 0;     ///< part of the work per frame that contacts do not change
   double change = 0;    ///< what a change to it costs; 0 if it goes on from where it was
@@ -28,12 +28,13 @@ enum class ChoiceState : std::uint8_t {
 /// answer, and the first frame has to be its own. Each candidate answers whole units, a frame or a segment of
 /// the flight plans. The incumbent is the candidate of the least estimate; all others are challengers.
 ///
-/// Estimates age. Work is counted in the units that a candidate answers; while others answer, the part that
-/// depends on contacts follows their number, and the estimate becomes uncertain with the frames that pass and
-/// with every change of what is observed; half as fast after each trial in a row that the candidate lost. A
-/// challenger is tried when the work that it may have saved since its last trial, and may save in the frames
-/// that a choice usually lasts, equals what the trial and the change are expected to cost (ski rental), if
-/// the budget allows it.
+/// Estimates age. Work is counted in the units that a candidate answers: its usual frame, and what the first
+/// frame of a unit took beyond that, which the frames of a later unit share. While others answer, the part
+/// that depends on contacts follows their number, and the estimate becomes uncertain with the frames that
+/// pass and with every change of what is observed; half as fast after each trial in a row that the candidate
+/// lost. Once contacts have changed fourfold, a prediction replaces it. A challenger is tried when the work
+/// that it may have saved since its last trial, and may save in the frames that a choice usually lasts,
+/// equals what the trial and the change are expected to cost (ski rental), if the budget allows it.
 ///
 /// The budget. Let W be all work counted since `start_over`. The charge of a trial is its work so far, minus
 /// `stay_estimate` for each frame that it has answered, but at least 0. Each candidate has one allowance for
@@ -64,6 +65,13 @@ class ChoicePolicy {
 
   /// Chooses the candidate that answers the next frame; `offers` has an entry for each.
   std::size_t next(std::span<const Offer> offers);
+  /// Whether the unit of the active candidate has ended. If not, and if the candidate can still answer,
+  /// `go_on` lets it answer the next frame, too, without offers.
+  bool due() const { return left_ <= 0; }
+  std::size_t go_on() {
+    --left_;
+    return active_;
+  }
   /// Registers the work of the active candidate in the current frame, and the number of contacts found.
   void worked(double work, double contacts);
   /// Registers that the active candidate reached its limit in the current frame after `work`. Returns the
@@ -84,6 +92,8 @@ class ChoicePolicy {
   /// Returns the estimated work of a frame of a candidate; infinite before its first unit.
   double estimate(std::size_t candidate) const;
 
+  /// Returns the number of contacts, relative to the first frame's.
+  double contacts() const { return contacts_; }
   double all_work() const { return all_work_; }
   /// Returns the charges of all trials, and the allowances that they used.
   double charges() const { return charged_ + charge(); }
@@ -91,7 +101,8 @@ class ChoicePolicy {
 
  private:
   struct Candidate {
-    double fixed = 0, varying = 0;  ///< work per frame, counted in its last unit
+    double frame = 0;               ///< work of a usual frame of its last unit
+    double search = 0;              ///< what the unit's first frame took beyond that
     double contacts = 1;            ///< `contacts_` at that time
     double changes = 0;             ///< `changes_` at that time
     double regret = 0;              ///< work that it may have saved since its last trial
@@ -103,14 +114,13 @@ class ChoicePolicy {
 
   void transition(Event event);
   void begin(std::size_t candidate, ChoiceState state);
-  void learn(double per_frame, double fixed);
+  void learn(double frame, double search);
   void settle();
   std::size_t best_known() const;
   std::size_t challenger();
   double allowance(std::size_t candidate) const;
   double charge() const;
-  double age(const Candidate& candidate) const;
-  double hoped(std::size_t candidate) const;
+  double change_of_contacts(const Candidate& candidate) const;
 
   Settings settings_;
   std::vector<Candidate> candidates_;
@@ -118,7 +128,7 @@ class ChoicePolicy {
   ChoiceState state_ = ChoiceState::stays;
   std::size_t active_ = refit, incumbent_ = refit, last_ = refit;
   int left_ = 0, answered_ = 0;  ///< frames of the unit
-  double unit_work_ = 0, limit_ = 0, stay_ = 0, allowance_ = 0;
+  double unit_work_ = 0, first_work_ = 0, limit_ = 0, stay_ = 0, allowance_ = 0;
   double all_work_ = 0, charged_ = 0, allowances_ = 0, paid_ = 0;
   double found_ = -1;                  ///< contacts of the last frame
   double contacts_ = 1, changes_ = 0;  ///< relative number of contacts; other changes, and frames
