@@ -69,6 +69,7 @@ class Auto final : public OneOfMany<S>,
     this->start_over(t);
     for (Runner& runner : runners_) runner.searched_until = -never;
     seen_ = size_;
+    refit_ = {};
     look_at_ = 1;
     started_at_ = 0;
     step_ = 0;
@@ -82,6 +83,7 @@ class Auto final : public OneOfMany<S>,
     end_frame();
     if (t > this->previous_time()) step_ = t - this->previous_time();
     look(t);
+    if (!policy_->due() && frames_of(policy_->active(), t) > 0) return answer_by(policy_->go_on(), t);
     make_offers(t);
     answer_by(policy_->next(offers_), t);
   }
@@ -104,6 +106,12 @@ class Auto final : public OneOfMany<S>,
     if (!done) status = active().strategy->candidates_at(t, out, {});
     see(out.size() - before);
     return status;
+  }
+
+  /// Counts the contacts: pairs that intersect are the same for all candidates, unlike those that may.
+  void confirm_candidates(double t, PairBuffer& pairs) override {
+    Base::confirm_candidates(t, pairs);
+    contacts_ = double(pairs.size());
   }
 
   void find_changes(double t, Answer answer, PairBuffer& begun, PairBuffer& ended) override {
@@ -190,7 +198,7 @@ class Auto final : public OneOfMany<S>,
 
   void begin_frame(double t) {
     asked_ = pairs_asked_ = false;
-    ray_tests_ = found_ = 0;
+    ray_tests_ = found_ = contacts_ = 0;
     span_tests_ = runner().work->span_tests();
     frame_tests_ = runner().work->frame_tests();
     fetched_ = this->sampled_.fetched();
@@ -199,11 +207,11 @@ class Auto final : public OneOfMany<S>,
     if (searches_) runner().searched_until = segment_end_;
   }
   void see(std::size_t candidates) {
-    found_ = double(candidates);
+    found_ = contacts_ = double(candidates);
     asked_ = pairs_asked_ = true;
   }
   /// Returns the work of this frame without the query.
-  double update_work() const { return searches_ ? candidate().update(seen_) : ChoicePrices::frame; }
+  double update_work() const { return searches_ ? candidate().update(seen_) : candidate().frame; }
   /// Counts the work of the frame that ends.
   void end_frame() {
     only_rays_ = asked_ && !pairs_asked_;
@@ -211,10 +219,6 @@ class Auto final : public OneOfMany<S>,
     const ReportsWork& work = *runner().work;
     const double pair_tests = pairs_asked_ && searches_ ? double(work.last_box_tests()) : 0,
                  ray_tests = costs::Ageing::ray_test * ray_tests_;
-    if (policy_->active() == ChoicePolicy::refit) {
-      seen_.pairs = found_;
-      seen_.box_tests = pair_tests + ray_tests;
-    }
     double query = ray_tests + candidate().box_test * pair_tests + candidate().pair * found_;
     if (is_join())
       query += ChoicePrices::span_test * double(work.span_tests() - span_tests_) +
@@ -225,22 +229,27 @@ class Auto final : public OneOfMany<S>,
       query += upkeep(candidate().build * seen_.primitives,
                       known ? candidate().box_test * work.growth() : seen_.ageing);
     }
-    policy_->worked(update_work() + query, found_);
+    const bool is_refit = policy_->active() == ChoicePolicy::refit;
+    policy_->worked(update_work() + query, contacts_);
+    if (is_refit) refit_ = {pair_tests + ray_tests, found_, policy_->contacts()};
   }
 
   // ---- Observations
 
-  /// Looks at the plans where a segment begins and after changes that have become rare, and at the surfaces
-  /// of boxes from time to time.
+  /// Looks at the plans where a segment begins and after changes that have become rare, and from time to time
+  /// at velocities and at the surfaces of boxes.
   void look(double t) {
     const int frame = this->frame() + 1;
     plans_are_old_ = plans_are_old_ || plans_changed_;
     seen_.changes_per_frame +=
         ((std::exchange(plans_changed_, false) ? 1.0 : 0.0) - seen_.changes_per_frame) / std::min(frame, 16);
-    if (step_ > 0 && (t >= segment_end_ || (plans_are_old_ && seen_.changes_per_frame <= rare)))
-      look_at_plans();
-    if (frame < look_at_ || !refits(runner()) || !(surface_ > 0)) return;
+    // A join answers the last frame of a segment before it begins the next one.
+    const bool ends = is_join() ? t > segment_end_ : t >= segment_end_;
+    if (step_ > 0 && (ends || (plans_are_old_ && seen_.changes_per_frame <= rare))) look_at_plans();
+    if (frame < look_at_) return;
     look_at_ = frame + std::min(frame, longest_look);
+    seen_.translates = translate();
+    if (!refits(runner()) || !(surface_ > 0)) return;
     const double growth = std::max(1.0, runner().work->surface() / surface_);
     policy_->changed(std::abs(growth / seen_.growth - 1));
     seen_.growth = growth;
@@ -254,7 +263,6 @@ class Auto final : public OneOfMany<S>,
       segment_end_ = std::min(segment_end_, motion_.lines_end(body));
     }
     seen_.frames = std::max(1.0, (segment_end_ - segment_begin_) / step_);
-    seen_.translates = translate();
   }
   /// Whether some bodies move as a whole: each of them the same at its first, middle and last vertex.
   bool translate() const {
@@ -284,20 +292,20 @@ class Auto final : public OneOfMany<S>,
     seen_.refit = never;
     for (std::size_t i = 0; i < runners_.size(); ++i)
       if (refits(runners_[i])) seen_.refit = std::min(seen_.refit, policy_->estimate(i));
+    const double more = policy_->contacts() / refit_.contacts;
+    seen_.box_tests = more * refit_.box_tests;
+    seen_.pairs = more * refit_.pairs;
     seen_.ageing = seen_.box_tests * (1 - 1 / seen_.growth) / (this->frame() + 1);
     for (std::size_t i = 0; i < runners_.size(); ++i) {
       const ChoiceCandidate& one = *runners_[i].candidate;
       const bool joins = one.unit == ChoiceUnit::segment;
       Offer& offer = offers_[i];
       offer.frames = frames_of(i, t);
-      offer.whole = joins ? int(std::min(seen_.frames, double(longest_unit))) : offer.frames;
-      offer.fixed = joins ? ChoicePrices::frame + (one.update(seen_) - ChoicePrices::frame) / seen_.frames
-                          : one.update(seen_);
+      offer.whole =
+          joins ? std::max(offer.frames, int(std::min(seen_.frames, double(longest_unit)))) : offer.frames;
+      offer.fixed = joins ? one.frame + (one.update(seen_) - one.frame) / offer.whole : one.update(seen_);
       offer.change = this->goes_on(i) ? 0 : ChoicePrices::start * primitives_ + one.build * seen_.primitives;
-      if (std::isfinite(policy_->estimate(i))) continue;
-      const auto [expected, hoped] = one.predict == nullptr
-                                         ? ChoiceCandidate::Prediction{seen_.refit, 0.5 * seen_.refit}
-                                         : one.predict(seen_, one);
+      const auto [expected, hoped] = one.predict(seen_, one);
       offer.expected = expected;
       offer.hoped = hoped;
     }
@@ -314,7 +322,7 @@ class Auto final : public OneOfMany<S>,
     // A search for the last frames of a segment takes as long as one for all of it.
     const bool begins = step_ > 0 && (runner == policy_->active() || t - segment_begin_ <= 1.5 * step_);
     if (!begins || seen_.changes_per_frame > rare || !(segment_end_ - segment_begin_ < never)) return 0;
-    return int(std::clamp((segment_end_ - t) / step_ + 0.5, 1.0, double(longest_unit)));
+    return int(std::clamp((segment_end_ - t) / step_ + 1.5, 1.0, double(longest_unit)));
   }
 
   static constexpr double rare = 0.02;  ///< changes of plans per frame
@@ -323,15 +331,19 @@ class Auto final : public OneOfMany<S>,
   std::vector<Runner> runners_;  ///< of the instances
   std::vector<Offer> offers_;    ///< [runner]
   std::optional<ChoicePolicy> policy_;
-  double primitives_ = 0;                       ///< of all bodies
-  Observed size_, seen_;                        ///< before any frame, and now
+  double primitives_ = 0;  ///< of all bodies
+  Observed size_, seen_;   ///< before any frame, and now
+  /// The last frame of the refit.
+  struct {
+    double box_tests = 0, pairs = 0, contacts = 1;
+  } refit_;
   int look_at_ = 1, started_at_ = 0;            ///< frames: of the next look, of the active one's start
   double step_ = 0, surface_ = 0;               ///< seconds; of the refitted boxes at the start
   double segment_begin_ = 0, segment_end_ = 0;  ///< seconds
   bool plans_changed_ = false, plans_are_old_ = false;  ///< since the last frame, since the last look
   // Of the current frame; the counts are those at its beginning.
   bool searches_ = false, asked_ = false, pairs_asked_ = false, only_rays_ = false;
-  double ray_tests_ = 0, found_ = 0;
+  double ray_tests_ = 0, found_ = 0, contacts_ = 0;  ///< found_: candidates
   std::uint64_t span_tests_ = 0, frame_tests_ = 0, fetched_ = 0;
 };
 

@@ -364,9 +364,50 @@ TEST(ChoicePolicy, EstimatesFollowContactsButForTheFixedPart) {
   ASSERT_EQ(policy.active(), 1u);
   policy.worked(30, 84);
   policy.next(offers);
-  policy.worked(50, 184);                         // twice as many, with the 16 that stand for few
-  EXPECT_DOUBLE_EQ(policy.estimate(0), 100 * 2);  // the first frame came before any offer
+  policy.worked(50, 184);  // twice as many, with the 16 that stand for few
+  EXPECT_DOUBLE_EQ(policy.estimate(0), 40 + 60 * 2);
   EXPECT_DOUBLE_EQ(policy.estimate(1), 50);
+}
+
+// The first frame of a unit searches for all of it.
+TEST(ChoicePolicy, TheFramesOfAUnitShareItsSearch) {
+  ChoicePolicy policy(2, {});
+  policy.start_over();
+  policy.worked(100, 50);
+  std::vector<Offer> offers(2);
+  offers[1] = {.expected = 60, .hoped = 60, .frames = 10, .whole = 10};
+  for (int frame = 0; frame < 10; ++frame) {
+    policy.next(offers);
+    ASSERT_EQ(policy.active(), 1u);
+    policy.worked(frame == 0 ? 510 : 10, 50);
+  }
+  for (const int frames : {10, 50, 5}) {
+    offers[1].frames = offers[1].whole = frames;
+    policy.next(offers);
+    EXPECT_EQ(policy.active(), 1u);
+    EXPECT_NEAR(policy.estimate(1), 10 + 500.0 / frames, 1e-9) << frames;
+  }
+}
+
+TEST(ChoicePolicy, APredictionReplacesACountOfOtherContacts) {
+  ChoicePolicy policy(2, {});
+  policy.start_over();
+  policy.worked(100, 0);
+  std::vector<Offer> offers(2);
+  offers[1] = {.expected = 150, .hoped = 60};
+  policy.next(offers);
+  ASSERT_EQ(policy.active(), 1u);
+  policy.worked(104, 0);  // a trial that is lost
+  for (int frame = 0; frame < 30; ++frame) {
+    policy.next(offers);
+    ASSERT_EQ(policy.active(), 0u) << frame;
+    policy.worked(100, 0);
+  }
+  // Had its work grown like the contacts, it would take sixty times as much.
+  offers[1] = {.expected = 700, .hoped = 400};
+  int waited = 0;
+  for (; waited < 100 && policy.next(offers) == 0; ++waited) policy.worked(1000, 984);
+  EXPECT_LT(waited, 30);
 }
 
 }  // namespace

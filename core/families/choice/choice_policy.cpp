@@ -166,8 +166,7 @@ std::size_t ChoicePolicy::best_known() const {
   for (std::size_t i = 0; i < candidates_.size(); ++i) {
     const Candidate& one = candidates_[i];
     const double age = changes_ - one.changes + change_of_contacts(one) - 1;
-    if (offers_[i].frames > 0 && one.known && age <= recent &&
-        estimate(i) * settings_.gain < estimate(best))
+    if (offers_[i].frames > 0 && one.known && age <= recent && estimate(i) * settings_.gain < estimate(best))
       best = i;
   }
   return best;
@@ -190,7 +189,8 @@ std::size_t ChoicePolicy::challenger() {
     if (i == incumbent_ || offer.frames == 0) continue;
     const bool counts = one.known && change_of_contacts(one) <= forgets;
     const double expected = counts ? estimate(i) : offer.expected,
-                 hoped = counts ? expected / (1 + std::ldexp(changes_ - one.changes, -one.lost)) : offer.hoped;
+                 hoped =
+                     counts ? expected / (1 + std::ldexp(changes_ - one.changes, -one.lost)) : offer.hoped;
     if (!(hoped < stay / settings_.gain)) continue;
     one.regret += (stay - hoped) * answered_;
     const double cost = offer.change + offers_[incumbent_].change + (expected - stay) * offer.frames;

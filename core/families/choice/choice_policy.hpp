@@ -101,13 +101,13 @@ class ChoicePolicy {
 
  private:
   struct Candidate {
-    double frame = 0;               ///< work of a usual frame of its last unit
-    double search = 0;              ///< what the unit's first frame took beyond that
-    double contacts = 1;            ///< `contacts_` at that time
-    double changes = 0;             ///< `changes_` at that time
-    double regret = 0;              ///< work that it may have saved since its last trial
-    int lost = 0;                   ///< trials in a row that it lost
-    bool known = false;             ///< has answered a unit
+    double frame = 0;     ///< work of a usual frame of its last unit
+    double search = 0;    ///< what the unit's first frame took beyond that
+    double contacts = 1;  ///< `contacts_` at that time
+    double changes = 0;   ///< `changes_` at that time
+    double regret = 0;    ///< work that it may have saved since its last trial
+    int lost = 0;         ///< trials in a row that it lost
+    bool known = false;   ///< has answered a unit
     bool allowance_is_free = true;
   };
   enum class Event : std::uint8_t { unit_due, unit_done, limit_reached };

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/contract/registry.hpp"
-#include "core/families/choice/changes_of_many.hpp"
+#include "core/scene/pair_difference.hpp"
 
 namespace kbvh {
 
@@ -29,7 +29,9 @@ class OneOfMany : public Strategy<S>, public AnswersChanges<S>, public TakesPlan
     for (Instance& one : instances_) one.strategy->be_timed();
   }
   std::size_t bytes() const override {
-    std::size_t total = changed_.capacity() * sizeof(PlanChange<S>) + changes_of_many_.bytes();
+    std::size_t total = changed_.capacity() * sizeof(PlanChange<S>) + difference_.bytes() +
+                        (now_.capacity() + before_.capacity()) * sizeof(PrimitivePair);
+    for (const Reported& one : reported_) total += one.pairs.bytes();
     for (const Instance& one : instances_) total += one.strategy->bytes();
     return total;
   }
@@ -62,7 +64,7 @@ class OneOfMany : public Strategy<S>, public AnswersChanges<S>, public TakesPlan
     retired_ = {};
     changed_.clear();
     body_changed_.assign(this->scene_.body_count(), 0);
-    changes_of_many_.start_over();
+    for (Reported& one : reported_) one.pairs.clear();
     frame_ = changed_at_ = 0;
     active_ = 0;
     start(t);
@@ -70,7 +72,7 @@ class OneOfMany : public Strategy<S>, public AnswersChanges<S>, public TakesPlan
   /// Makes an instance answer the next frame, at t.
   void answer_by(std::size_t instance, double t) {
     const bool advances = goes_on(instance);
-    if (instance != active_) changes_of_many_.switched();
+    if (instance != active_) switched();
     active_ = instance;
     ++frame_;
     ++active().frames;
@@ -91,12 +93,30 @@ class OneOfMany : public Strategy<S>, public AnswersChanges<S>, public TakesPlan
     return instance == active_ || (one.started && frame_ - one.last < few_frames && changed_at_ <= one.last);
   }
   /// Returns the pairs of the last answer as changes.
-  const PairSet& pairs_of_changes(Answer answer) const { return changes_of_many_.pairs(answer); }
+  const PairSet& pairs_of_changes(Answer answer) const { return reported_[std::size_t(answer)].pairs; }
   int frame() const { return frame_; }
 
   void confirm_candidates(double t, PairBuffer& pairs) override { active().strategy->confirm(t, pairs); }
   void find_changes(double t, Answer answer, PairBuffer& begun, PairBuffer& ended) override {
-    changes_of_many_.find(*active().strategy, t, answer, begun, ended);
+    Reported& reported = reported_[std::size_t(answer)];
+    Strategy<S>& strategy = *active().strategy;
+    strategy.changes_at(t, answer, begun, ended);
+    if (!std::exchange(reported.current, true)) {
+      // What the instance last answered itself may be old. Its changes brought it up to date; reported is
+      // the difference from the pairs of its predecessor.
+      begun.clear();
+      ended.clear();
+      now_.clear();
+      if (answer == Answer::pairs)
+        strategy.pairs_at(t, now_);
+      else
+        strategy.candidates_at(t, now_, {});
+      before_.clear();
+      reported.pairs.append_to(before_);
+      difference_.find(before_, now_, begun, ended);
+    }
+    for (const PrimitivePair& pair : ended) reported.pairs.erase(pair);
+    for (const PrimitivePair& pair : begun) reported.pairs.insert(pair);
   }
   void follow_plans(double t, std::span<const PlanChange<S>> changes) override {
     for (const PlanChange<S>& change : changes)
@@ -137,7 +157,10 @@ class OneOfMany : public Strategy<S>, public AnswersChanges<S>, public TakesPlan
     one.strategy->reset(t);
     if (!changed_.empty()) one.strategy->flight_plans_changed(t, changed_);
     one.started = true;
-    changes_of_many_.switched();
+    switched();
+  }
+  void switched() {
+    for (Reported& one : reported_) one.current = false;
   }
 
   std::size_t active_ = 0;
@@ -146,7 +169,14 @@ class OneOfMany : public Strategy<S>, public AnswersChanges<S>, public TakesPlan
   std::uint64_t first_fetch_ = 0;
   std::vector<PlanChange<S>> changed_;  ///< the first change of each body since `reset`
   std::vector<std::uint8_t> body_changed_;
-  ChangesOfMany<S> changes_of_many_;
+  /// The sum of all changes of an answer.
+  struct Reported {
+    PairSet pairs;
+    bool current = false;  ///< from the currently active instance
+  };
+  Reported reported_[2];  ///< [Answer]
+  PairBuffer now_, before_;
+  PairDifference difference_;
 };
 
 }  // namespace kbvh
