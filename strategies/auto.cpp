@@ -263,11 +263,12 @@ class Auto final : public OneOfMany<S>,
       segment_end_ = std::min(segment_end_, motion_.lines_end(body));
     }
     seen_.frames = std::max(1.0, (segment_end_ - segment_begin_) / step_);
+    if (seen_.translates) seen_.translates = translate();
   }
   /// Whether some bodies move as a whole: each of them the same at its first, middle and last vertex.
   bool translate() const {
     int looked_at = 0;
-    for (std::uint32_t body = 0; body < this->scene_.body_count() && looked_at < 8; ++body) {
+    for (std::uint32_t body = 0; body < this->scene_.body_count() && looked_at < 4; ++body) {
       const std::uint32_t count = this->scene_.vertex_count(body);
       if (!this->scene_.moving(body) || count == 0) continue;
       ++looked_at;
@@ -320,12 +321,14 @@ class Auto final : public OneOfMany<S>,
     if (unit == ChoiceUnit::frame) return 1;
     if (unit == ChoiceUnit::frames) return frames_of_unit;
     // A search for the last frames of a segment takes as long as one for all of it.
-    const bool begins = step_ > 0 && (runner == policy_->active() || t - segment_begin_ <= 1.5 * step_);
+    const bool begins = step_ > 0 && (runner == policy_->active() ||
+                                      segment_end_ - t >= most_of_it * (segment_end_ - segment_begin_));
     if (!begins || seen_.changes_per_frame > rare || !(segment_end_ - segment_begin_ < never)) return 0;
     return int(std::clamp((segment_end_ - t) / step_ + 1.5, 1.0, double(longest_unit)));
   }
 
-  static constexpr double rare = 0.02;  ///< changes of plans per frame
+  static constexpr double rare = 0.02;       ///< changes of plans per frame
+  static constexpr double most_of_it = 0.6;  ///< of a segment that has to be left for a join to begin
 
   SegmentMotion<S> motion_;
   std::vector<Runner> runners_;  ///< of the instances

@@ -145,6 +145,7 @@ void ChoicePolicy::learn(double frame, double search) {
   one.contacts = contacts_;
   one.changes = changes_;
   one.known = true;
+  one.surplus = std::max(1.0, estimate(active_) / std::max(1e-9, offers_[active_].expected));
 }
 
 /// Books the charge of a trial that ends.
@@ -188,9 +189,9 @@ std::size_t ChoicePolicy::challenger() {
     const Offer& offer = offers_[i];
     if (i == incumbent_ || offer.frames == 0) continue;
     const bool counts = one.known && change_of_contacts(one) <= forgets;
-    const double expected = counts ? estimate(i) : offer.expected,
-                 hoped =
-                     counts ? expected / (1 + std::ldexp(changes_ - one.changes, -one.lost)) : offer.hoped;
+    const double doubt = 1 + std::ldexp(changes_ - one.changes, -one.lost),
+                 expected = counts ? estimate(i) : one.surplus * offer.expected,
+                 hoped = counts ? expected / doubt : std::max(1.0, one.surplus / doubt) * offer.hoped;
     if (!(hoped < stay / settings_.gain)) continue;
     one.regret += (stay - hoped) * answered_;
     const double cost = offer.change + offers_[incumbent_].change + (expected - stay) * offer.frames;

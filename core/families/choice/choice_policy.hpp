@@ -32,9 +32,10 @@ enum class ChoiceState : std::uint8_t {
 /// frame of a unit took beyond that, which the frames of a later unit share. While others answer, the part
 /// that depends on contacts follows their number, and the estimate becomes uncertain with the frames that
 /// pass and with every change of what is observed; half as fast after each trial in a row that the candidate
-/// lost. Once contacts have changed fourfold, a prediction replaces it. A challenger is tried when the work
-/// that it may have saved since its last trial, and may save in the frames that a choice usually lasts,
-/// equals what the trial and the change are expected to cost (ski rental), if the budget allows it.
+/// lost. Once contacts have changed fourfold, a prediction replaces it, times what the last count was over
+/// its prediction. A challenger is tried when the work that it may have saved since its last trial, and may
+/// save in the frames that a choice usually lasts, equals what the trial and the change are expected to cost
+/// (ski rental), if the budget allows it.
 ///
 /// The budget. Let W be all work counted since `start_over`. The charge of a trial is its work so far, minus
 /// `stay_estimate` for each frame that it has answered, but at least 0. Each candidate has one allowance for
@@ -105,6 +106,7 @@ class ChoicePolicy {
     double search = 0;    ///< what the unit's first frame took beyond that
     double contacts = 1;  ///< `contacts_` at that time
     double changes = 0;   ///< `changes_` at that time
+    double surplus = 1;   ///< the unit's work over its prediction, if it was more
     double regret = 0;    ///< work that it may have saved since its last trial
     int lost = 0;         ///< trials in a row that it lost
     bool known = false;   ///< has answered a unit
