@@ -189,9 +189,11 @@ std::size_t ChoicePolicy::challenger() {
     const Offer& offer = offers_[i];
     if (i == incumbent_ || offer.frames == 0) continue;
     const bool counts = one.known && change_of_contacts(one) <= forgets;
+    // What was counted, and how it differed from its prediction, says less with time and other contacts.
     const double doubt = 1 + std::ldexp(changes_ - one.changes, -one.lost),
-                 expected = counts ? estimate(i) : one.surplus * offer.expected,
-                 hoped = counts ? expected / doubt : std::max(1.0, one.surplus / doubt) * offer.hoped;
+                 mistrust = std::max(1.0, one.surplus * forgets / (doubt * change_of_contacts(one))),
+                 expected = counts ? estimate(i) : mistrust * offer.expected,
+                 hoped = counts ? expected / doubt : mistrust * offer.hoped;
     if (!(hoped < stay / settings_.gain)) continue;
     one.regret += (stay - hoped) * answered_;
     const double cost = offer.change + offers_[incumbent_].change + (expected - stay) * offer.frames;
