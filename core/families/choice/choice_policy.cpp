@@ -191,7 +191,7 @@ std::size_t ChoicePolicy::challenger() {
     const bool counts = one.known && change_of_contacts(one) <= forgets;
     // What was counted, and how it differed from its prediction, says less with time and other contacts.
     const double doubt = 1 + std::ldexp(changes_ - one.changes, -one.lost),
-                 mistrust = std::max(1.0, one.surplus * forgets / (doubt * change_of_contacts(one))),
+                 mistrust = 1 + (one.surplus - 1) / doubt * forgets / change_of_contacts(one),
                  expected = counts ? estimate(i) : mistrust * offer.expected,
                  hoped = counts ? expected / doubt : mistrust * offer.hoped;
     if (!(hoped < stay / settings_.gain)) continue;
