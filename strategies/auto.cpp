@@ -70,6 +70,7 @@ class Auto final : public OneOfMany<S>,
     for (Runner& runner : runners_) runner.searched_until = -never;
     seen_ = size_;
     refit_ = {};
+    first_join_ = 0;
     look_at_ = 1;
     started_at_ = 0;
     step_ = 0;
@@ -229,9 +230,10 @@ class Auto final : public OneOfMany<S>,
       query += upkeep(candidate().build * seen_.primitives,
                       known ? candidate().box_test * work.growth() : seen_.ageing);
     }
-    const bool is_refit = policy_->active() == ChoicePolicy::refit;
     policy_->worked(update_work() + query, contacts_);
-    if (is_refit) refit_ = {pair_tests + ray_tests, found_, policy_->contacts()};
+    if (policy_->active() == ChoicePolicy::refit)
+      refit_ = {pair_tests + ray_tests, found_, policy_->contacts(), seen_.growth};
+    if (is_join() && pair_tests > 0) see_join_age(pair_tests / policy_->contacts());
   }
 
   // ---- Observations
@@ -251,8 +253,17 @@ class Auto final : public OneOfMany<S>,
     seen_.translates = translate();
     if (!refits(runner()) || !(surface_ > 0)) return;
     const double growth = std::max(1.0, runner().work->surface() / surface_);
+    see_growth(growth);
+  }
+  void see_growth(double growth) {
     policy_->changed(std::abs(growth / seen_.growth - 1));
     seen_.growth = growth;
+  }
+  /// A join's trees are those of the refit. Their age shows in its box tests for each contact, if clearly.
+  void see_join_age(double tests_per_contact) {
+    if (!(first_join_ > 0)) first_join_ = tests_per_contact;
+    const double grown = tests_per_contact / first_join_;
+    if (grown > 1.5) see_growth(std::cbrt(grown * grown));
   }
   void look_at_plans() {
     plans_are_old_ = false;
@@ -294,7 +305,7 @@ class Auto final : public OneOfMany<S>,
     for (std::size_t i = 0; i < runners_.size(); ++i)
       if (refits(runners_[i])) seen_.refit = std::min(seen_.refit, policy_->estimate(i));
     const double more = policy_->contacts() / refit_.contacts;
-    seen_.box_tests = more * refit_.box_tests;
+    seen_.box_tests = more * refit_.box_tests * std::pow(seen_.growth / refit_.growth, 1.5);
     seen_.pairs = more * refit_.pairs;
     seen_.ageing = seen_.box_tests * (1 - 1 / seen_.growth) / (this->frame() + 1);
     for (std::size_t i = 0; i < runners_.size(); ++i) {
@@ -338,8 +349,9 @@ class Auto final : public OneOfMany<S>,
   Observed size_, seen_;   ///< before any frame, and now
   /// The last frame of the refit.
   struct {
-    double box_tests = 0, pairs = 0, contacts = 1;
+    double box_tests = 0, pairs = 0, contacts = 1, growth = 1;
   } refit_;
+  double first_join_ = 0;                       ///< box tests for each contact of the first join
   int look_at_ = 1, started_at_ = 0;            ///< frames: of the next look, of the active one's start
   double step_ = 0, surface_ = 0;               ///< seconds; of the refitted boxes at the start
   double segment_begin_ = 0, segment_end_ = 0;  ///< seconds
