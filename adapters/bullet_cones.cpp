@@ -2,7 +2,8 @@
 // cones around the normals below them, and btDbvt::selfCollideT skips the pairs within a node whose cone is
 // narrow. Approximate: it loses pairs, which the oracle counts. `bullet_dbvt` finds all of them.
 //
-// - Narrow cones prove that a surface does not cut itself only together with a test of its contour. Bullet has
+// - Narrow cones prove that a surface does not cut itself only together with a test of its contour. Bullet
+// has
 //   none: a strip that turns in its plane and cuts its own beginning is skipped as a whole. Bullet also skips
 //   a node until the angle between axis and normals exceeds 180 degrees; the proof would allow 90. Its cones
 //   around cones are wider than the normals are, which makes up for a part of this.
@@ -12,9 +13,9 @@
 //   near-linear, and what has no neighbours left is joined in its order.
 // - btSoftBody recomputes boxes and cones at every frame, children first, by functions that it does not
 //   export. The loops here do the same: the axis of a node halves the angle between the axes of its children,
-//   and half of that angle is added to the larger angle of the two. Two things differ in Bullet's favour: boxes
-//   have no margin, and normals are normalised in double, where Bullet takes a triangle with sides of 0.0003
-//   for one without a normal.
+//   and half of that angle is added to the larger angle of the two. Two things differ in Bullet's favour:
+//   boxes have no margin, and normals are normalised in double, where Bullet takes a triangle with sides of
+//   0.0003 for one without a normal.
 #include "bullet.hpp"
 
 #include <BulletCollision/BroadphaseCollision/btDbvt.h>
@@ -118,8 +119,9 @@ std::vector<Two> join_neighbours(std::uint32_t leaves, std::vector<Two> links) {
     }
     std::swap(roots, above);
     for (Two& link : links) link = {number[link[0]], number[link[1]]};
-    links.erase(std::remove_if(links.begin(), links.end(), [](const Two& link) { return link[0] == link[1]; }),
-                links.end());
+    links.erase(
+        std::remove_if(links.begin(), links.end(), [](const Two& link) { return link[0] == link[1]; }),
+        links.end());
   }
   return inner;
 }
@@ -256,12 +258,11 @@ class BulletCones final : public Contestant, public AnswersSelfPairs {
     std::size_t total = 0;
     for (const BodyState& state : bodies_) {
       // Bullet aligns a node of a btDbvt to 16 bytes within a block, and keeps the block's address before it.
-      total += sizeof(BodyState) +
-               state.nodes.size() * heap_block_bytes(sizeof(btDbvtNode) + sizeof(void*) + 16) +
-               state.cone_nodes.size() * heap_block_bytes(sizeof(btDbvntNode)) +
-               state.nodes.capacity() * sizeof(btDbvtNode*) +
-               state.cone_nodes.capacity() * sizeof(btDbvntNode*) +
-               std::size_t(state.tree.m_stkStack.capacity()) * sizeof(state.tree.m_stkStack[0]);
+      total +=
+          sizeof(BodyState) + state.nodes.size() * heap_block_bytes(sizeof(btDbvtNode) + sizeof(void*) + 16) +
+          state.cone_nodes.size() * heap_block_bytes(sizeof(btDbvntNode)) +
+          state.nodes.capacity() * sizeof(btDbvtNode*) + state.cone_nodes.capacity() * sizeof(btDbvntNode*) +
+          std::size_t(state.tree.m_stkStack.capacity()) * sizeof(state.tree.m_stkStack[0]);
     }
     return total;
   }
@@ -301,7 +302,9 @@ class BulletCones final : public Contestant, public AnswersSelfPairs {
   static AuditView view_of(const Node* root) {
     return breadth_first(
         root, [](const Node* node) { return node->isleaf() ? int(primitive_of(*node)) : -1; },
-        [](const Node* node) { return std::pair<const Node*, const Node*>(node->childs[0], node->childs[1]); },
+        [](const Node* node) {
+          return std::pair<const Node*, const Node*>(node->childs[0], node->childs[1]);
+        },
         [](const Node* node) { return box_of(node); });
   }
 
@@ -357,7 +360,6 @@ KBVH_STRATEGY(bullet_cones) {
   info.tightness = Tightness::tight;
   info.guarantee = Guarantee::approximate;
   info.primitives = {PrimitiveKind::polygons};
-  info.remark =
-      "its cones of normals have no test of the contour, so it misses pairs within a body";
+  info.remark = "its cones of normals have no test of the contour, so it misses pairs within a body";
   return {make_entry<bullet::BulletCones, Scalars::float_only>(std::move(info))};
 }

@@ -264,8 +264,8 @@ template <class S>
 double gap_between(const Box<S>& a, const Box<S>& b) {
   double gap = -std::numeric_limits<double>::infinity();
   for (int axis = 0; axis < 3; ++axis)
-    gap = std::max({gap, double(b.lower[axis]) - double(a.upper[axis]),
-                    double(a.lower[axis]) - double(b.upper[axis])});
+    gap = std::max(
+        {gap, double(b.lower[axis]) - double(a.upper[axis]), double(a.lower[axis]) - double(b.upper[axis])});
   return gap;
 }
 

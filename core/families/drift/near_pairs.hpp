@@ -40,8 +40,7 @@ struct NearWork {
   std::vector<NearPair> found;
   std::vector<FoundPair> chunk;
   std::size_t bytes() const {
-    return stack.size() * sizeof(WidePair) +
-           (leaf_pairs.size() + own_leaves.capacity()) * sizeof(LeafSlot) +
+    return stack.size() * sizeof(WidePair) + (leaf_pairs.size() + own_leaves.capacity()) * sizeof(LeafSlot) +
            found.capacity() * sizeof(NearPair) + chunk.capacity() * sizeof(FoundPair);
   }
 };
@@ -71,8 +70,8 @@ class NearPairs {
  public:
   /// Searches from scratch. The reach per side is the sum of both margins and must be positive. Adds the box
   /// tests made to `tests`. Allocates only if there are more pairs than ever before. Both hierarchies need
-  /// the same width and leaf size and must not be empty. For a body with itself, both sides are the same; each
-  /// pair is listed once, canonical.
+  /// the same width and leaf size and must not be empty. For a body with itself, both sides are the same;
+  /// each pair is listed once, canonical.
   void build(const NearSide<S>& a, const NearSide<S>& b, std::uint32_t body_a, std::uint32_t body_b,
              const S (&reach)[6], NearWork<S>& work, std::uint64_t& tests);
   void clear();
