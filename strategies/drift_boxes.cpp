@@ -4,7 +4,8 @@
 // old boxes touch. One traversal, over boxes swept over the motion of several frames, therefore finds the
 // candidates of all these frames, in the order in which the motion lets them meet, and a frame takes a prefix
 // of that list (core/families/drift/near_pairs.hpp). Bodies that cannot meet any other body get one box per
-// frame and no boxes below it.
+// frame and no boxes below it. Pairs within a body depend on how much the displacements of its own vertices
+// differ: a body that moves as a whole keeps its list.
 //
 // The displacements are found by reading each vertex twice (then and now, in memory order), or, in the
 // variant with a bound on steps, by one addition per body. `drift_boxes_approximate` assumes only a share of
@@ -29,6 +30,7 @@ namespace {
 
 template <class S, class Motion>
 class DriftStrategy : public CountedStrategy<S>,
+                      public AnswersSelfPairs,
                       public AnswersProbes<S>,
                       public TakesPlanChanges<S>,
                       public ReportsWork {
@@ -444,8 +446,8 @@ class DriftStrategy : public CountedStrategy<S>,
     search_due_ = false;
   }
   NearSide<S> side(std::uint32_t index) {
-    return {&hierarchies_[index], this->sampled_.positions(index), bodies_[index].margin, &rows_[index],
-            bodies_[index].rounding()};
+    return {&hierarchies_[index], this->sampled_.positions(index), bodies_[index].margin,
+            &rows_[index],        bodies_[index].rounding(),       &this->scene_.primitives(index)};
   }
 
   Motion motion_;
