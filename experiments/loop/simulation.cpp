@@ -34,6 +34,14 @@ json identity_of(const SimulationOptions& options) {
           {"record", options.record}, {"frames_every", options.frames_every}};
 }
 
+/// Returns how many of the first faces belong to obstacles.
+std::uint64_t leading_obstacle_faces(const SimulatedMesh& mesh) {
+  for (Eigen::Index f = 0; f < mesh.faces.rows(); ++f)
+    for (int k = 0; k < 3; ++k)
+      if (mesh.obstacle[mesh.faces(f, k)] == 0) return std::uint64_t(f);
+  return std::uint64_t(mesh.faces.rows());
+}
+
 json header_record(const SimulationOptions& options, const Simulated& scene) {
   const Physics& physics = scene.physics;
   const SimulatedMesh& mesh = scene.mesh;
@@ -52,6 +60,7 @@ json header_record(const SimulationOptions& options, const Simulated& scene) {
             {"inner_vertices", mesh.inner.size()},
             {"edges", mesh.edges.rows()},
             {"faces", mesh.faces.rows()},
+            {"obstacle_faces", leading_obstacle_faces(mesh)},
             {"springs", mesh.springs.size()},
             {"hinges", mesh.hinges.size()}}},
           {"physics",
