@@ -141,7 +141,8 @@ int run_simulation(LoopArguments arguments) {
                  {"worst step, ms", fmt::format("{:.4g}", sums.worst_ms)},
                  {"memory, MB", memory_text(sums.resident_mb)}}));
   print("From iterates on, numbers are means over the " + counted(n, "step") +
-        " made now, but for the worst step and the largest\nmemory, in the first and in the last tenth of these steps.\n");
+        " made now, but for the worst step and the largest\nmemory, in the first and in the last tenth of "
+        "these steps.\n");
   if (result.penetrations == 0) return success;
   say(counted(result.penetrations, "pair") + " of triangles penetrated, first after step " +
       std::to_string(result.first_penetration));

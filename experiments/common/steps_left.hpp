@@ -4,7 +4,8 @@
 
 namespace kbvh::experiments {
 
-/// Returns "about 40 s left: ", "about 3 min left: " or "about 5 h left: ", or "" for a negative number of seconds.
+/// Returns "about 40 s left: ", "about 3 min left: " or "about 5 h left: ", or "" for a negative number of
+/// seconds.
 std::string time_left_in_words(double seconds);
 
 /// Estimates how long the remaining steps of a simulation take. Steps become slower and faster as a scene
@@ -12,8 +13,8 @@ std::string time_left_in_words(double seconds);
 class StepsLeft {
  public:
   static constexpr double memory = 50;  // steps
-  /// A step was made, after which `left` remain. `now` in seconds, of any clock that never goes back; the first
-  /// call is where the clock starts.
+  /// A step was made, after which `left` remain. `now` in seconds, of any clock that never goes back; the
+  /// first call is where the clock starts.
   void made(std::uint64_t left, double now);
   /// Returns the estimated seconds, or a negative number during the first 3 s.
   double seconds() const;

@@ -17,7 +17,8 @@ using std::numbers::pi;
 /// The trefoil, whose lobe around t = pi points along -y; without that lobe's tip it is an overhand knot.
 constexpr double knot_height = 1.3;
 Vector3 trefoil(double t) {
-  return {std::sin(t) + 2 * std::sin(2 * t), std::cos(t) - 2 * std::cos(2 * t), -knot_height * std::sin(3 * t)};
+  return {std::sin(t) + 2 * std::sin(2 * t), std::cos(t) - 2 * std::cos(2 * t),
+          -knot_height * std::sin(3 * t)};
 }
 Vector3 trefoil_direction(double t) {
   return Vector3(std::cos(t) + 4 * std::cos(2 * t), -std::sin(t) + 4 * std::sin(2 * t),
@@ -51,8 +52,8 @@ std::vector<Vector3> resampled(std::span<const Vector3> line, std::size_t count)
   double passed = 0;
   for (std::size_t i = 1; i < line.size(); ++i) {
     const double part = (line[i] - line[i - 1]).norm();
-    for (double wanted = spacing * double(points.size()); wanted <= passed + part && points.size() + 1 < count;
-         wanted = spacing * double(points.size()))
+    for (double wanted = spacing * double(points.size());
+         wanted <= passed + part && points.size() + 1 < count; wanted = spacing * double(points.size()))
       points.push_back(line[i - 1] + (wanted - passed) / part * (line[i] - line[i - 1]));
     passed += part;
   }

@@ -154,8 +154,7 @@ void NewtonSystem::solve(Positions& direction) {
     throw std::runtime_error("the Hessian of a step is not positive definite");
   for (std::size_t v = 0; v < block_of_.size(); ++v)
     if (const std::int32_t block = block_of_[v]; block >= 0)
-      direction.row(Eigen::Index(v)) =
-          -solution_.segment<3>(3 * place_[std::size_t(block)]).transpose();
+      direction.row(Eigen::Index(v)) = -solution_.segment<3>(3 * place_[std::size_t(block)]).transpose();
 }
 
 double NewtonSystem::slope(const Positions& direction) const {

@@ -13,9 +13,10 @@ namespace kbvh::experiments::loop {
 /// of the vertices that are not fixed. Sums are in the order of the calls, so equal calls give equal bits.
 ///
 /// The Hessian keeps every block that an earlier sum had since `forget_entries`, as zeros if need be: only a
-/// block that is new asks for another order of elimination and another symbolic factorisation, which allocate.
-/// Everything else reuses its memory, but for what Eigen's numeric factorisation takes and returns at once: an
-/// array of indices, and three more of a number for each row where these are too large for its stack.
+/// block that is new asks for another order of elimination and another symbolic factorisation, which
+/// allocate. Everything else reuses its memory, but for what Eigen's numeric factorisation takes and returns
+/// at once: an array of indices, and three more of a number for each row where these are too large for its
+/// stack.
 class NewtonSystem {
  public:
   explicit NewtonSystem(const SimulatedMesh& mesh);
@@ -25,17 +26,16 @@ class NewtonSystem {
   /// Starts as if there had been no sum yet: what follows depends on the calls from here on.
   void forget_entries() { pattern_.clear(); }
   void add_gradient(std::uint32_t vertex, const Eigen::Vector3d& gradient) {
-    if (const std::int32_t block = block_of_[vertex]; block >= 0)
-      gradient_.segment<3>(3 * block) += gradient;
+    if (const std::int32_t block = block_of_[vertex]; block >= 0) gradient_.segment<3>(3 * block) += gradient;
   }
   /// Adds a symmetric block of a vertex.
   void add_block(std::uint32_t vertex, const Eigen::Matrix3d& block);
   /// Adds the block of rows of one vertex and columns of another one, and its transpose at the other place.
   void add_block(std::uint32_t row, std::uint32_t column, const Eigen::Matrix3d& block);
 
-  /// Solves Hessian * direction = -gradient by a sparse Cholesky factorisation, where every vertex that is not
-  /// fixed needs a block of its own. Rows of fixed vertices are zero. Throws std::runtime_error if the Hessian
-  /// is not positive definite or holds an invalid number.
+  /// Solves Hessian * direction = -gradient by a sparse Cholesky factorisation, where every vertex that is
+  /// not fixed needs a block of its own. Rows of fixed vertices are zero. Throws std::runtime_error if the
+  /// Hessian is not positive definite or holds an invalid number.
   void solve(Positions& direction);
 
   const Eigen::VectorXd& gradient() const { return gradient_; }
@@ -75,7 +75,7 @@ class NewtonSystem {
   std::int32_t blocks_ = 0;
   Eigen::VectorXd gradient_, solution_;
   std::vector<Entry> entries_;
-  std::vector<std::uint32_t> order_, spare_order_, counts_;  // of entries, stable by key
+  std::vector<std::uint32_t> order_, spare_order_, counts_;       // of entries, stable by key
   std::vector<std::uint64_t> present_, pattern_, spare_pattern_;  // ascending keys
   std::vector<int> place_;                                        // [block] in the order of elimination
   std::vector<Slot> slots_;                                       // [key of the pattern]

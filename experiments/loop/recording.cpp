@@ -138,7 +138,8 @@ void RecordingReader::read_header() {
   read(std::size_t(header_bytes - fixed_header_bytes));
   const char* at = buffer_.data();
   for (std::uint64_t v = 0; v < n; ++v) {
-    if (*at != 0 && *at != 1) io::fail(file_, "vertex " + std::to_string(v), "is neither of an obstacle nor free");
+    if (*at != 0 && *at != 1)
+      io::fail(file_, "vertex " + std::to_string(v), "is neither of an obstacle nor free");
     mesh.obstacle.push_back(std::uint8_t(*at++));
   }
   const auto vertex = [&](const char* what, std::uint64_t id) {

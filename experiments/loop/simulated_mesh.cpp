@@ -198,8 +198,7 @@ std::uint32_t MeshBuilder::add_rope(const Rope& rope) {
   // The frame of a ring is that of the ring before it, turned as little as the line's direction needs.
   Vector3 direction = (line[1] - line[0]).normalized(), normal = direction.unitOrthogonal();
   for (std::uint32_t i = 0; i < rings; ++i) {
-    const Vector3 next =
-        (line[std::min(i + 1, rings - 1)] - line[i == 0 ? 0 : i - 1]).normalized();
+    const Vector3 next = (line[std::min(i + 1, rings - 1)] - line[i == 0 ? 0 : i - 1]).normalized();
     normal = Eigen::Quaterniond::FromTwoVectors(direction, next) * normal;
     normal = (normal - normal.dot(next) * next).normalized();
     direction = next;

@@ -28,17 +28,17 @@ struct Hinge {
   double stiffness;  ///< N/m
 };
 
-/// A joint of a script: what hangs on it turns about an axis and is carried along. Everything stands still, in
-/// the pose of the mesh, at time 0, and starts within half a second.
+/// A joint of a script: what hangs on it turns about an axis and is carried along. Everything stands still,
+/// in the pose of the mesh, at time 0, and starts within half a second.
 struct Joint {
-  std::int32_t parent = -1;          ///< an earlier joint, which carries this one; -1: none
-  Eigen::Vector3d pivot{0, 0, 0};    ///< m, at time 0
-  Eigen::Vector3d axis{0, 0, 1};     ///< of length 1
-  double turn = 0;                   ///< rad/s, all the time
-  double bend = 0, swing = 0;        ///< rad: the angle is bend + swing sin(2 pi time / period + phase)
-  double phase = 0;                  ///< rad
-  Eigen::Vector3d travel{0, 0, 0};   ///< m: there and back once a period
-  double period = 1;                 ///< s
+  std::int32_t parent = -1;         ///< an earlier joint, which carries this one; -1: none
+  Eigen::Vector3d pivot{0, 0, 0};   ///< m, at time 0
+  Eigen::Vector3d axis{0, 0, 1};    ///< of length 1
+  double turn = 0;                  ///< rad/s, all the time
+  double bend = 0, swing = 0;       ///< rad: the angle is bend + swing sin(2 pi time / period + phase)
+  double phase = 0;                 ///< rad
+  Eigen::Vector3d travel{0, 0, 0};  ///< m: there and back once a period
+  double period = 1;                ///< s
 };
 
 /// What is simulated: one mesh whose parts have no common vertices, its material, and its state at the start.
@@ -46,10 +46,11 @@ struct SimulatedMesh {
   Positions positions, velocities;
   EdgeList edges;  ///< all edges of the faces, once each
   FaceList faces;
-  std::vector<double> mass;          ///< [vertex], kg
-  std::vector<std::uint8_t> fixed;   ///< [vertex], 1 for vertices that never move
-  std::vector<std::int32_t> joint;   ///< [vertex], the joint that a driven vertex follows; -1: none
-  std::vector<std::uint8_t> obstacle;  ///< [vertex]: 1: elements of such vertices alone do not touch each other
+  std::vector<double> mass;         ///< [vertex], kg
+  std::vector<std::uint8_t> fixed;  ///< [vertex], 1 for vertices that never move
+  std::vector<std::int32_t> joint;  ///< [vertex], the joint that a driven vertex follows; -1: none
+  std::vector<std::uint8_t>
+      obstacle;                      ///< [vertex]: 1: elements of such vertices alone do not touch each other
   std::vector<std::uint32_t> inner;  ///< vertices of no face, ascending: they touch nothing
   std::vector<Spring> springs;
   std::vector<Hinge> hinges;
@@ -93,7 +94,8 @@ std::string scene_title(const std::string& name);
 ///   sheets: sheets fall, turned at random, onto a floor and onto each other
 ///   stack:  soft boxes fall onto a floor and onto each other
 ///   walker: three skirts, one over the other, on a figure that walks in a circle
-///   knot:   a rope with an overhand knot is pulled at its ends and let go, again and again; its cross-section
+///   knot:   a rope with an overhand knot is pulled at its ends and let go, again and again; its
+///   cross-section
 ///           has at least 5 corners, which takes about 600 triangles
 Simulated make_scene(const std::string& name, std::uint64_t triangles, std::uint64_t seed);
 
@@ -133,7 +135,8 @@ class MeshBuilder {
   /// A square cloth of side x side vertices, cut into triangles. Returns its first vertex.
   std::uint32_t add_cloth(const Sheet& sheet, const Material& material);
   /// A cloth over a grid whose vertex (x, y) is at points[y * columns + x]. Returns its first vertex.
-  std::uint32_t add_cloth(const Grid& grid, std::span<const Eigen::Vector3d> points, const Material& material);
+  std::uint32_t add_cloth(const Grid& grid, std::span<const Eigen::Vector3d> points,
+                          const Material& material);
   /// A soft rope with closed ends: springs within each ring and between neighbours. Returns its first vertex;
   /// ring i has the vertices (sides + 1) i to (sides + 1) i + sides, of which the last is its centre.
   std::uint32_t add_rope(const Rope& rope);

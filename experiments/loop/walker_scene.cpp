@@ -129,8 +129,7 @@ Simulated walker_scene(std::uint64_t triangles, SceneChance& chance) {
         const double radius = waist + gap * layer + flare * down;
         points.emplace_back(radius * std::cos(turn), radius * std::sin(turn), top - height * down);
       }
-    const std::uint32_t first =
-        builder.add_cloth({columns, rows, true}, points, MeshBuilder::Material{});
+    const std::uint32_t first = builder.add_cloth({columns, rows, true}, points, MeshBuilder::Material{});
     for (std::uint32_t x = 0; x < columns; ++x) builder.drive(first + x, body);
     const double dent = 0.01 * height / rows;
     for (std::uint32_t v = first + columns; v < first + rows * columns; ++v)

@@ -1,5 +1,5 @@
-// Bodies that follow a script: where they are, how well they follow it, that contact holds them back, and that
-// a run that was killed finds them where it left them.
+// Bodies that follow a script: where they are, how well they follow it, that contact holds them back, and
+// that a run that was killed finds them where it left them.
 #include "experiments/loop/script.hpp"
 
 #include <gtest/gtest.h>
