@@ -40,7 +40,7 @@ def step(number: int, penetrations: int = 0) -> dict[str, Any]:
 
 
 #: A floor, and two triangles above it that share no vertex.
-FLOOR = [(-1, -1, 0), (1, -1, 0), (0, 1, 0)]
+FLOOR = [(-0.7, -0.7, 0), (0.7, -0.7, 0), (0, 0.7, 0)]
 FIRST = [(-0.5, 0, 0.5), (0, 0, 0.5), (-0.25, 0, 1)]
 SECOND = [(0.1, 0, 0.5), (0.6, 0, 0.5), (0.35, 0, 1)]
 
