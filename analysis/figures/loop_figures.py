@@ -127,7 +127,7 @@ def _panel(figure: Figure, place: int, title: str, log: bool = False) -> Axes:
 
 
 def _key(axes: Axes) -> None:
-    axes.legend(frameon=False, fontsize=7.5, handlelength=1.4, labelspacing=0.25, borderaxespad=0.2)
+    axes.legend(loc="upper right", frameon=False, fontsize=7.5, handlelength=1.4, labelspacing=0.25, borderaxespad=0.2)
 
 
 def over_time(simulation: Simulation) -> Optional[Figure]:
