@@ -65,6 +65,24 @@ class Picture:
 EMBEDDED_DPI, EMBEDDED_COLOURS = 120, 64
 
 
+def _small(figure: Figure) -> bytes:
+    drawn, small = io.BytesIO(), io.BytesIO()
+    figure.savefig(drawn, format="png", dpi=EMBEDDED_DPI)
+    Image.open(drawn).convert("RGB").quantize(EMBEDDED_COLOURS, dither=Image.Dither.NONE).save(small, format="png", optimize=True)
+    return small.getvalue()
+
+
+def small_png(draw: Callable[[], Optional[Figure]]) -> bytes:
+    """Draws a figure as the small PNG that pages embed; b"" if there is nothing to draw."""
+    with matplotlib.rc_context(STYLE):
+        figure = draw()
+        if figure is None:
+            return b""
+        FigureCanvasAgg(figure)
+        settle(figure)
+        return _small(figure)
+
+
 def picture(
     folder: Path, name: str, title: str, reading: str, draw: Callable[[], Optional[Figure]], embedded: bool = True
 ) -> Optional[Picture]:
@@ -82,11 +100,7 @@ def picture(
             drawn = io.BytesIO()
             figure.savefig(drawn, format=kind, **said)
             files.write_whole(folder / f"{name}.{kind}", drawn.getvalue())
-        buffer = io.BytesIO()
-        if embedded:
-            drawn = io.BytesIO()
-            figure.savefig(drawn, format="png", dpi=EMBEDDED_DPI)
-            Image.open(drawn).convert("RGB").quantize(EMBEDDED_COLOURS, dither=Image.Dither.NONE).save(buffer, format="png", optimize=True)
+        small = _small(figure) if embedded else b""
     width, height = figure.get_size_inches()
-    uri = "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii") if embedded else ""
+    uri = "data:image/png;base64," + base64.b64encode(small).decode("ascii") if embedded else ""
     return Picture(name, title, reading, uri, round(width * 96), round(height * 96))

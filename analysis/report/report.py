@@ -25,7 +25,7 @@ from figures.canvas import Picture, picture
 from figures.colours import Look, looks
 from ratios import ageing, choices, robustness
 from ratios.limits import limits, threads_said
-from report import sections, tables, targets_table
+from report import loop_part, sections, tables, targets_table
 from results import files, text
 from results.load import ONE_OF_EACH_COMMIT, ResultError, Study, load
 
@@ -144,6 +144,7 @@ def write(
         choices=choices.choices(study),
         stress=robustness.stress(folder),
         ccd=robustness.ccd(folder),
+        loops=loop_part.loop_part(folder, which, study.notes),
         strategies=_strategies(study),
         machine=_machine(study),
         made=_made(study),

@@ -1,15 +1,20 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
+#include <chrono>
+#include <cstddef>
 #include <memory>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "experiments/cli/commands.hpp"
 #include "experiments/cli/options.hpp"
 #include "experiments/cli/program.hpp"
 #include "experiments/common/output.hpp"
 #include "experiments/common/progress.hpp"
+#include "experiments/common/steps_left.hpp"
+#include "experiments/common/stopwatch.hpp"
 #include "experiments/common/text.hpp"
 #include "experiments/io/bytes.hpp"
 #include "experiments/loop/frames.hpp"
@@ -26,12 +31,14 @@ namespace {
 constexpr const char* loop_examples = R"(Examples:
   kbvh loop --scene sphere --triangles 2000 --steps 200 --out results/loop
   kbvh loop --scene stack --detect kept --keep 1 --steps 100
+  kbvh loop --scene walker --steps 10000 --save-every 100 --out results/walker
   kbvh loop --scene sheets --triangles 4000 --record --out results/sheets
   kbvh loop --play results/sheets/loop.recording
 Simulates cloth or soft bodies whose contacts come from kbvh::broad_phase: implicit steps, a barrier that keeps surfaces
 apart, no step beyond an impact. A pair that the broad phase loses is a penetration; after each step an exact check, which
 does not use the broad phase, counts intersecting triangles. The scenes: sphere (a cloth falls onto a sphere), cloths (a
-cloth onto a cloth held at its corners), sheets (six sheets onto a floor), stack (three soft boxes onto a floor).
+cloth onto a cloth held at its corners), sheets (six sheets onto a floor), stack (three soft boxes onto a floor), walker (a
+figure that walks in three skirts), knot (a rope with a knot, pulled and let go).
 DIR/loop.jsonl has a line for each step; the same command continues a run that was ended. --record writes the motions of all
 iterates, which --play asks again in several ways, by turns, and compares with each other and with all pairs.
 Exit codes: 0 no penetration and equal answers, 1 a penetration or a difference, 2 wrong use, 3 other error.)";
@@ -46,7 +53,9 @@ struct LoopArguments {
 /// Sums of the lines of the steps that were made now.
 struct StepSums {
   std::uint64_t steps = 0, iterates = 0, questions = 0, searches = 0, candidates = 0, most_contacts = 0;
-  double detect_ms = 0, impact_ms = 0, rest_ms = 0, worst_ms = 0, smallest_gap = 0;
+  std::uint64_t orders = 0;
+  double detect_ms = 0, impact_ms = 0, rest_ms = 0, worst_ms = 0, smallest_gap = 0, largest_lag = 0;
+  std::vector<double> resident_mb{};  ///< after each step
 
   void add(const json& record) {
     const double detect = record["detect_ms"], impact = record["impact_ms"], rest = record["rest_ms"],
@@ -54,6 +63,9 @@ struct StepSums {
     smallest_gap = steps == 0 ? gap : std::min(smallest_gap, gap);
     ++steps;
     iterates += record["iterates"].get<std::uint64_t>();
+    orders += record["orders"].get<std::uint64_t>();
+    largest_lag = std::max(largest_lag, record["lag_m"].get<double>());
+    resident_mb.push_back(record["resident_bytes"].get<double>() / 1e6);
     questions += record["questions"].get<std::uint64_t>();
     searches += record["searches"].get<std::uint64_t>();
     candidates += record["candidates"].get<std::uint64_t>();
@@ -64,6 +76,15 @@ struct StepSums {
     worst_ms = std::max(worst_ms, detect + impact + rest);
   }
 };
+
+/// Returns the largest memory in the first tenth of the steps and in the last one, in MB: what a run needs at
+/// first, and whether it needs more and more.
+std::string memory_text(const std::vector<double>& megabytes) {
+  if (megabytes.empty()) return "-";
+  const auto tenth = std::ptrdiff_t((megabytes.size() + 9) / 10);
+  return fmt::format("{:.1f}, {:.1f}", *std::max_element(megabytes.begin(), megabytes.begin() + tenth),
+                     *std::max_element(megabytes.end() - tenth, megabytes.end()));
+}
 
 std::string share_text(double value, std::uint64_t steps) {
   return steps == 0 ? "-" : fmt::format("{:.4g}", value / double(steps));
@@ -83,12 +104,16 @@ int run_simulation(LoopArguments arguments) {
     throw io::InputError("--frames: needs --out, the folder of the frames");
   Progress progress;
   StepSums sums;
+  StepsLeft left;
   std::uint64_t penetrations = 0;
+  const auto begin = std::chrono::steady_clock::now();
   const loop::SimulationResult result = loop::simulate(options, [&](const json& record) {
     sums.add(record);
     penetrations += record["penetrations"].get<std::uint64_t>();
-    progress.show(fmt::format("{}: step {} of {}, {} contacts, {} iterates, {:.1f} ms, {} penetrations",
-                              options.scene, record["step"].get<std::uint64_t>(), options.steps,
+    const auto made = record["step"].get<std::uint64_t>();
+    left.made(options.steps - made, seconds_since(begin));
+    progress.show(fmt::format("{}{}: step {} of {}, {} contacts, {} iterates, {:.1f} ms, {} penetrations",
+                              time_left_in_words(left.seconds()), options.scene, made, options.steps,
                               record["contacts"].get<std::uint64_t>(),
                               record["iterates"].get<std::uint64_t>(),
                               record["detect_ms"].get<double>() + record["impact_ms"].get<double>() +
@@ -105,14 +130,19 @@ int run_simulation(LoopArguments arguments) {
                  {"unconverged steps", std::to_string(result.unconverged)},
                  {"most contacts", std::to_string(sums.most_contacts)},
                  {"smallest gap, mm", fmt::format("{:.3g}", 1e3 * sums.smallest_gap)},
+                 {"largest lag, mm", fmt::format("{:.3g}", 1e3 * sums.largest_lag)},
                  {"iterates", share_text(double(sums.iterates), n)},
+                 {"orders", share_text(double(sums.orders), n)},
                  {"searches", share_text(double(sums.searches), n)},
                  {"candidates", share_text(double(sums.candidates), n)},
                  {"detection, ms", share_text(sums.detect_ms, n)},
                  {"impacts, ms", share_text(sums.impact_ms, n)},
                  {"rest, ms", share_text(sums.rest_ms, n)},
-                 {"worst step, ms", fmt::format("{:.4g}", sums.worst_ms)}}));
-  print("Iterates, searches, candidates and times are means over the " + counted(n, "step") + " made now.\n");
+                 {"worst step, ms", fmt::format("{:.4g}", sums.worst_ms)},
+                 {"memory, MB", memory_text(sums.resident_mb)}}));
+  print("From iterates on, numbers are means over the " + counted(n, "step") +
+        " made now, but for the worst step and the largest\nmemory, in the first and in the last tenth of "
+        "these steps.\n");
   if (result.penetrations == 0) return success;
   say(counted(result.penetrations, "pair") + " of triangles penetrated, first after step " +
       std::to_string(result.first_penetration));
@@ -173,7 +203,7 @@ void add_loop(CLI::App& program, Action& action) {
   auto a = std::make_shared<LoopArguments>();
   loop::SimulationOptions& options = a->simulation;
   CLI::Option* of_simulations[] = {
-      add_text(*command, "--scene", options.scene, "sphere, cloths, sheets or stack (sphere)"),
+      add_text(*command, "--scene", options.scene, "sphere, cloths, sheets, stack, walker or knot (sphere)"),
       add_whole(*command, "--triangles", options.triangles, {8, 1u << 24},
                 "of the moving bodies, about (2000)"),
       add_whole(*command, "--seed", options.seed, ranges::any, "of the scene's random numbers (1)"),

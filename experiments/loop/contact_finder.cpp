@@ -10,8 +10,8 @@
 namespace kbvh::experiments::loop {
 namespace {
 
-/// Groups of vertices: those of fixed ones pair with others only.
-constexpr GroupMask moving_group{1, ~std::uint32_t(0)}, fixed_group{2, ~std::uint32_t(2)};
+/// Groups of vertices: those of obstacles pair with others only.
+constexpr GroupMask moving_group{1, ~std::uint32_t(0)}, obstacle_group{2, ~std::uint32_t(2)};
 
 /// Returns whether the seeded fault takes a pair.
 bool is_lost(CandidateKind kind, const Candidate& pair, std::uint32_t every) {
@@ -48,7 +48,7 @@ ContactMesh::ContactMesh(const SimulatedMesh& mesh)
     : vertices(mesh.vertex_count()),
       edges(mesh.edges),
       faces(mesh.faces),
-      fixed(mesh.fixed),
+      obstacle(mesh.obstacle),
       inner(mesh.inner) {}
 
 IterateDetector::IterateDetector(const ContactMesh& mesh, const Settings& settings)
@@ -62,7 +62,8 @@ void IterateDetector::build(const Positions& x) {
   broad_.build(x, mesh_.edges, mesh_.faces, settings_.radius);
   broad_.remove(Element::vertex, mesh_.inner);
   std::vector<GroupMask> groups;
-  for (const std::uint8_t fixed : mesh_.fixed) groups.push_back(fixed != 0 ? fixed_group : moving_group);
+  for (const std::uint8_t obstacle : mesh_.obstacle)
+    groups.push_back(obstacle != 0 ? obstacle_group : moving_group);
   broad_.set_vertex_groups(groups);
   if (settings_.lose_every > 0)
     broad_.keep_if([every = settings_.lose_every](CandidateKind kind, const Candidate& pair) {

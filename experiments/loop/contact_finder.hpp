@@ -26,7 +26,8 @@ struct ContactMesh {
   std::uint32_t vertices = 0;
   EdgeList edges;
   FaceList faces;
-  std::vector<std::uint8_t> fixed;  ///< [vertex]; elements of fixed vertices alone are no pairs of each other
+  std::vector<std::uint8_t>
+      obstacle;                      ///< [vertex]; elements of such vertices alone are no pairs of each other
   std::vector<std::uint32_t> inner;  ///< vertices that touch nothing
 
   ContactMesh() = default;

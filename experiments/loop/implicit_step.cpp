@@ -18,12 +18,12 @@ FourPoints points_of(const std::uint32_t (&vertices)[4], const Positions& x) {
   return points;
 }
 
-/// Returns the mean mass of a vertex that can move.
+/// Returns the mean mass of a free vertex.
 double mean_mass(const SimulatedMesh& mesh) {
   double sum = 0;
   std::size_t count = 0;
   for (std::uint32_t v = 0; v < mesh.vertex_count(); ++v)
-    if (mesh.fixed[v] == 0) {
+    if (mesh.is_free(v)) {
       sum += mesh.mass[v];
       ++count;
     }
@@ -56,7 +56,7 @@ State first_state(const SimulatedMesh& mesh) {
 }
 
 ImplicitStep::ImplicitStep(const Simulated& scene, ContactFinder& finder)
-    : scene_(scene), finder_(finder), system_(scene.mesh) {
+    : scene_(scene), finder_(finder), system_(scene.mesh), script_(scene.mesh) {
   const Physics& physics = scene.physics;
   barrier_ = {physics.thickness, physics.reach, physics.repulsion * physics.reach * mean_mass(scene.mesh)};
   for (Eigen::Index e = 0; e < scene.mesh.edges.rows(); ++e)
@@ -166,7 +166,11 @@ StepReport ImplicitStep::advance(State& state) {
   const double h = physics.time_step;
   free_ = state.positions;
   for (std::uint32_t v = 0; v < mesh.vertex_count(); ++v)
-    if (mesh.fixed[v] == 0) free_.row(v) += h * state.velocities.row(v) + h * h * physics.gravity.transpose();
+    if (mesh.is_free(v)) free_.row(v) += h * state.velocities.row(v) + h * h * physics.gravity.transpose();
+  script_.place(double(state.step + 1) * h, free_);
+  // A step depends on its begin alone, so that one that is continued has the bits of one that was not.
+  system_.forget_entries();
+  const std::uint64_t orders_before = system_.orders();
   x_ = begin_ = state.positions;
   finder_.look_at(x_);
   collect(x_, active_);
@@ -213,6 +217,8 @@ StepReport ImplicitStep::advance(State& state) {
   at_end.ending = result.ending;
   at_end.iterates = result.iterates;
   at_end.evaluations = evaluations;
+  at_end.lag = script_.largest_distance(x_, free_);
+  at_end.orders = std::uint32_t(system_.orders() - orders_before);
   return at_end;
 }
 
@@ -220,7 +226,7 @@ StepReport ImplicitStep::report(const State& state) const {
   const SimulatedMesh& mesh = scene_.mesh;
   StepReport result;
   for (std::uint32_t v = 0; v < mesh.vertex_count(); ++v) {
-    if (mesh.fixed[v] != 0) continue;
+    if (!mesh.is_free(v)) continue;
     const Eigen::Vector3d velocity = state.velocities.row(v).transpose();
     result.kinetic += 0.5 * mesh.mass[v] * velocity.squaredNorm();
     result.gravitational -= mesh.mass[v] * scene_.physics.gravity.dot(state.positions.row(v).transpose());

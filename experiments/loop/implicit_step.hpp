@@ -6,6 +6,7 @@
 #include "experiments/loop/contact_finder.hpp"
 #include "experiments/loop/friction.hpp"
 #include "experiments/loop/newton_system.hpp"
+#include "experiments/loop/script.hpp"
 #include "experiments/loop/simulated_mesh.hpp"
 
 namespace kbvh::experiments::loop {
@@ -38,6 +39,8 @@ struct StepReport {
       0;  ///< m: the smallest distance of a pair, without the thickness; the reach if no pair repels
   double kinetic = 0, gravitational = 0, elastic = 0, barrier = 0;  ///< J
   Eigen::Vector3d momentum = Eigen::Vector3d::Zero();               ///< kg m/s
+  double lag = 0;            ///< m: the largest distance of a driven vertex to its place in the script
+  std::uint32_t orders = 0;  ///< computed orders of elimination
 };
 
 /// Steps of implicit Euler in their variational form: the end of a step minimises
@@ -45,7 +48,8 @@ struct StepReport {
 /// where x_free is where vertices fly without forces but gravity. Newton's method with Hessians whose
 /// negative eigenvalues are set to zero pair by pair, spring by spring; a line search that never leaves the
 /// part of a direction that is free of impacts (Li et al. 2020, "Incremental Potential Contact"). All pairs
-/// come from the finder: one that it loses is not kept apart.
+/// come from the finder: one that it loses is not kept apart. For driven vertices, x_free is where the script
+/// wants them: contact holds them back by its force times time_step^2 over their mass.
 ///
 /// Equal states and scenes give equal bits in one build, in whatever order the finder lists pairs.
 class ImplicitStep {
@@ -81,6 +85,7 @@ class ImplicitStep {
   ContactFinder& finder_;
   Barrier barrier_{};
   NewtonSystem system_;
+  ScriptPlayer script_;
   Positions begin_, free_, x_, end_, trial_, direction_;
   std::vector<Active> active_, trial_active_;
   struct Rubbing {

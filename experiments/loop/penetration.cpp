@@ -10,9 +10,9 @@ PenetrationCheck::PenetrationCheck(const SimulatedMesh& mesh) : mesh_(mesh) {
   const Eigen::Index faces = mesh.faces.rows();
   bounds_.resize(std::size_t(faces));
   for (Eigen::Index f = 0; f < faces; ++f) {
-    bool rests = true;
-    for (int k = 0; k < 3; ++k) rests = rests && mesh.fixed[mesh.faces(f, k)] != 0;
-    resting_.push_back(rests ? 1 : 0);
+    bool obstacle = true;
+    for (int k = 0; k < 3; ++k) obstacle = obstacle && mesh.obstacle[mesh.faces(f, k)] != 0;
+    obstacle_.push_back(obstacle ? 1 : 0);
     bounds_[std::size_t(f)].face = std::uint32_t(f);
   }
 }
@@ -34,7 +34,7 @@ std::uint64_t PenetrationCheck::intersecting_pairs(const Positions& x) {
       const Bounds& b = bounds_[j];
       if (a.low[1] > b.high[1] || b.low[1] > a.high[1] || a.low[2] > b.high[2] || b.low[2] > a.high[2])
         continue;
-      if (resting_[a.face] != 0 && resting_[b.face] != 0) continue;
+      if (obstacle_[a.face] != 0 && obstacle_[b.face] != 0) continue;
       const auto w = mesh_.faces.row(b.face);
       bool incident = false;
       for (int k = 0; k < 3; ++k) incident = incident || (v.array() == w(k)).any();

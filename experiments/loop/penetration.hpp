@@ -7,7 +7,7 @@
 namespace kbvh::experiments::loop {
 
 /// Counts the pairs of triangles without a common vertex that intersect or touch, exactly: the answer is that
-/// of real arithmetic on the given numbers. Pairs of triangles that never move are left out. It sweeps boxes
+/// of real arithmetic on the given numbers. Pairs of triangles of obstacles are left out. It sweeps boxes
 /// sorted along an axis and knows nothing of the broad phase that the simulator asks.
 class PenetrationCheck {
  public:
@@ -20,7 +20,7 @@ class PenetrationCheck {
     std::uint32_t face;
   };
   const SimulatedMesh& mesh_;
-  std::vector<std::uint8_t> resting_;  // [face]
+  std::vector<std::uint8_t> obstacle_;  // [face]
   std::vector<Bounds> bounds_;
 };
 

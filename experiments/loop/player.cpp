@@ -118,12 +118,13 @@ class Truth {
  private:
   bool may_touch(CandidateKind kind, const Candidate& pair) const {
     if (elements_.incident(kind, pair)) return false;
-    const auto& fixed = header_.mesh.fixed;
-    const auto rests = [&](Element element, std::uint32_t id) {
+    const auto& obstacle = header_.mesh.obstacle;
+    const auto is_obstacle = [&](Element element, std::uint32_t id) {
       const auto vertices = elements_.vertices(element, id);
-      return std::all_of(vertices.begin(), vertices.end(), [&](std::uint32_t v) { return fixed[v] != 0; });
+      return std::all_of(vertices.begin(), vertices.end(), [&](std::uint32_t v) { return obstacle[v] != 0; });
     };
-    if (rests(first_element(kind), pair.first) && rests(second_element(kind), pair.second)) return false;
+    if (is_obstacle(first_element(kind), pair.first) && is_obstacle(second_element(kind), pair.second))
+      return false;
     const auto& inner = header_.mesh.inner;
     return kind != CandidateKind::face_vertex || !std::binary_search(inner.begin(), inner.end(), pair.second);
   }

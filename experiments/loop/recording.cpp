@@ -30,7 +30,7 @@ std::string bytes_of(const RecordingHeader& header) {
   io::append_little_endian(out, std::uint32_t(mesh.inner.size()));
   io::append_little_endian(out, header.radius);
   io::append_little_endian(out, header.separation);
-  for (const std::uint8_t fixed : mesh.fixed) out.push_back(char(fixed));
+  for (const std::uint8_t obstacle : mesh.obstacle) out.push_back(char(obstacle));
   for (Eigen::Index i = 0; i < mesh.edges.size(); ++i) io::append_little_endian(out, mesh.edges.data()[i]);
   for (Eigen::Index i = 0; i < mesh.faces.size(); ++i) io::append_little_endian(out, mesh.faces.data()[i]);
   for (const std::uint32_t vertex : mesh.inner) io::append_little_endian(out, vertex);
@@ -138,8 +138,9 @@ void RecordingReader::read_header() {
   read(std::size_t(header_bytes - fixed_header_bytes));
   const char* at = buffer_.data();
   for (std::uint64_t v = 0; v < n; ++v) {
-    if (*at != 0 && *at != 1) io::fail(file_, "vertex " + std::to_string(v), "is neither fixed nor free");
-    mesh.fixed.push_back(std::uint8_t(*at++));
+    if (*at != 0 && *at != 1)
+      io::fail(file_, "vertex " + std::to_string(v), "is neither of an obstacle nor free");
+    mesh.obstacle.push_back(std::uint8_t(*at++));
   }
   const auto vertex = [&](const char* what, std::uint64_t id) {
     const auto value = io::load_little_endian<std::uint32_t>(at);

@@ -17,7 +17,7 @@ namespace kbvh::experiments::loop {
 ///   4 x 4  numbers of vertices n, edges m, faces k, inner vertices i
 ///   8      radius, double, m: pairs within it were sought
 ///   8      separation, double, m: impacts were sought at it
-///   n      1 for each fixed vertex, else 0
+///   n      1 for each vertex of an obstacle, else 0: elements of such vertices alone are no pairs
 ///   8 m    edges, two vertices each, 4 bytes a vertex
 ///   12 k   faces, three vertices each
 ///   4 i    inner vertices, ascending

@@ -3,6 +3,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <numbers>
 #include <utility>
 
 namespace kbvh::experiments::loop {
@@ -38,6 +40,8 @@ std::uint32_t MeshBuilder::add_vertex(const Vector3& at) {
   vertices_.push_back(at);
   mass_.push_back(0);
   fixed_.push_back(0);
+  obstacle_.push_back(0);
+  joint_.push_back(-1);
   return std::uint32_t(vertices_.size() - 1);
 }
 
@@ -50,35 +54,67 @@ void MeshBuilder::add_obstacle(std::span<const Vector3> vertices,
   const auto first = std::uint32_t(vertices_.size());
   for (const Vector3& vertex : vertices) {
     const std::uint32_t id = add_vertex(vertex);
-    fixed_[id] = 1;
+    fix(id);
     mass_[id] = 1;
   }
   for (const auto& face : faces) add_face(first + face[0], first + face[1], first + face[2]);
 }
 
+void MeshBuilder::add_driven_obstacle(std::span<const Vector3> vertices,
+                                      std::span<const Eigen::Vector3<std::uint32_t>> faces,
+                                      std::int32_t joint) {
+  const auto first = std::uint32_t(vertices_.size());
+  for (const Vector3& vertex : vertices) {
+    const std::uint32_t id = add_vertex(vertex);
+    obstacle_[id] = 1;
+    drive(id, joint);
+  }
+  for (const auto& face : faces) add_face(first + face[0], first + face[1], first + face[2]);
+}
+
+std::int32_t MeshBuilder::add_joint(const Joint& joint) {
+  joints_.push_back(joint);
+  return std::int32_t(joints_.size() - 1);
+}
+
+void MeshBuilder::drive(std::uint32_t vertex, std::int32_t joint) {
+  mass_[vertex] = 1;
+  joint_[vertex] = joint;
+}
+
 std::uint32_t MeshBuilder::add_cloth(const Sheet& sheet, const Material& material) {
   const std::uint32_t side = sheet.side;
-  const auto first = std::uint32_t(vertices_.size());
-  const std::size_t first_face = faces_.size(), first_spring = springs_.size();
+  std::vector<Vector3> points;
   for (std::uint32_t y = 0; y < side; ++y)
     for (std::uint32_t x = 0; x < side; ++x)
-      add_vertex(sheet.corner + sheet.along * (double(x) / (side - 1)) +
-                 sheet.across * (double(y) / (side - 1)));
-  for (std::uint32_t y = 0; y < side; ++y)
-    for (std::uint32_t x = 0; x < side; ++x) {
-      const std::uint32_t v = first + y * side + x;
-      if (x + 1 < side) add_spring(v, v + 1, material.stretch);
-      if (y + 1 < side) add_spring(v, v + side, material.stretch);
-      if (x + 1 == side || y + 1 == side) continue;
+      points.push_back(sheet.corner + sheet.along * (double(x) / (side - 1)) +
+                       sheet.across * (double(y) / (side - 1)));
+  return add_cloth(Grid{side, side, false}, points, material);
+}
+
+std::uint32_t MeshBuilder::add_cloth(const Grid& grid, std::span<const Vector3> points,
+                                     const Material& material) {
+  const std::uint32_t columns = grid.columns;
+  const auto first = std::uint32_t(vertices_.size());
+  const std::size_t first_face = faces_.size(), first_spring = springs_.size();
+  for (const Vector3& point : points) add_vertex(point);
+  for (std::uint32_t y = 0; y < grid.rows; ++y)
+    for (std::uint32_t x = 0; x < columns; ++x) {
+      const bool has_next = x + 1 < columns || grid.closed, has_lower = y + 1 < grid.rows;
+      const std::uint32_t v = first + y * columns + x;
+      const std::uint32_t next = x + 1 < columns ? v + 1 : first + y * columns;
+      if (has_next) add_spring(v, next, material.stretch);
+      if (has_lower) add_spring(v, v + columns, material.stretch);
+      if (!has_next || !has_lower) continue;
       // Both diagonals resist shear, although only one of them is an edge.
-      add_spring(v, v + side + 1, 0.5 * material.stretch);
-      add_spring(v + 1, v + side, 0.5 * material.stretch);
+      add_spring(v, next + columns, 0.5 * material.stretch);
+      add_spring(next, v + columns, 0.5 * material.stretch);
       if ((x + y) % 2 == 0) {
-        add_face(v, v + 1, v + side + 1);
-        add_face(v, v + side + 1, v + side);
+        add_face(v, next, next + columns);
+        add_face(v, next + columns, v + columns);
       } else {
-        add_face(v, v + 1, v + side);
-        add_face(v + 1, v + side + 1, v + side);
+        add_face(v, next, v + columns);
+        add_face(next, next + columns, v + columns);
       }
     }
   for (std::size_t f = first_face; f < faces_.size(); ++f) {
@@ -153,6 +189,59 @@ std::uint32_t MeshBuilder::add_soft_box(const Vector3& low, double side, std::ui
   return first;
 }
 
+std::uint32_t MeshBuilder::add_rope(const Rope& rope) {
+  const std::span<const Vector3> line = rope.line;
+  const std::uint32_t sides = rope.sides, stride = sides + 1;
+  const auto rings = std::uint32_t(line.size());
+  const auto first = std::uint32_t(vertices_.size());
+  const double spacing = (line[1] - line[0]).norm();
+  // The frame of a ring is that of the ring before it, turned as little as the line's direction needs.
+  Vector3 direction = (line[1] - line[0]).normalized(), normal = direction.unitOrthogonal();
+  for (std::uint32_t i = 0; i < rings; ++i) {
+    const Vector3 next = (line[std::min(i + 1, rings - 1)] - line[i == 0 ? 0 : i - 1]).normalized();
+    normal = Eigen::Quaterniond::FromTwoVectors(direction, next) * normal;
+    normal = (normal - normal.dot(next) * next).normalized();
+    direction = next;
+    const Vector3 other = direction.cross(normal);
+    for (std::uint32_t j = 0; j < sides; ++j) {
+      const double angle = 2 * std::numbers::pi * j / sides;
+      add_vertex(line[i] + rope.radius * (std::cos(angle) * normal + std::sin(angle) * other));
+    }
+    add_vertex(line[i]);
+  }
+  const double area = std::numbers::pi * rope.radius * rope.radius;
+  const double mass = rope.density * area * spacing / stride;
+  for (std::uint32_t v = first; v < vertices_.size(); ++v) mass_[v] = mass;
+  // As in a cubic grid of this spacing: springs are weaker the longer they are.
+  const double side = 2 * rope.radius * std::sin(std::numbers::pi / sides);
+  const auto join = [&](std::uint32_t a, std::uint32_t b) {
+    add_spring(a, b, rope.modulus * side * side * side / (vertices_[a] - vertices_[b]).squaredNorm());
+  };
+  for (std::uint32_t i = 0; i < rings; ++i) {
+    const std::uint32_t ring = first + i * stride, centre = ring + sides;
+    for (std::uint32_t j = 0; j < sides; ++j) {
+      const std::uint32_t v = ring + j, next = ring + (j + 1) % sides;
+      join(v, next);
+      join(v, centre);
+      if (i + 1 == rings) continue;
+      join(v, v + stride);
+      join(v, next + stride);
+      join(next, v + stride);
+      join(v, centre + stride);
+      join(centre, v + stride);
+      add_face(v, next, next + stride);
+      add_face(v, next + stride, v + stride);
+    }
+    if (i + 1 < rings) join(centre, centre + stride);
+  }
+  const std::uint32_t last = first + (rings - 1) * stride;
+  for (std::uint32_t j = 0; j < sides; ++j) {
+    add_face(first + sides, first + (j + 1) % sides, first + j);
+    add_face(last + sides, last + j, last + (j + 1) % sides);
+  }
+  return first;
+}
+
 SimulatedMesh MeshBuilder::finish() const {
   SimulatedMesh mesh;
   const auto n = Eigen::Index(vertices_.size());
@@ -169,6 +258,8 @@ SimulatedMesh MeshBuilder::finish() const {
   for (std::size_t e = 0; e < edges.size(); ++e) mesh.edges.row(Eigen::Index(e)) << edges[e][0], edges[e][1];
   mesh.mass = mass_;
   mesh.fixed = fixed_;
+  mesh.joint = joint_;
+  mesh.obstacle = obstacle_;
   std::vector<std::uint8_t> outer(vertices_.size(), 0);
   for (const auto& face : faces_)
     for (int k = 0; k < 3; ++k) outer[face[k]] = 1;
@@ -176,6 +267,7 @@ SimulatedMesh MeshBuilder::finish() const {
     if (outer[v] == 0) mesh.inner.push_back(v);
   mesh.springs = springs_;
   mesh.hinges = hinges_;
+  mesh.joints = joints_;
   return mesh;
 }
 

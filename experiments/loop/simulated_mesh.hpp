@@ -28,18 +28,38 @@ struct Hinge {
   double stiffness;  ///< N/m
 };
 
+/// A joint of a script: what hangs on it turns about an axis and is carried along. Everything stands still,
+/// in the pose of the mesh, at time 0, and starts within half a second.
+struct Joint {
+  std::int32_t parent = -1;         ///< an earlier joint, which carries this one; -1: none
+  Eigen::Vector3d pivot{0, 0, 0};   ///< m, at time 0
+  Eigen::Vector3d axis{0, 0, 1};    ///< of length 1
+  double turn = 0;                  ///< rad/s, all the time
+  double bend = 0, swing = 0;       ///< rad: the angle is bend + swing sin(2 pi time / period + phase)
+  double phase = 0;                 ///< rad
+  Eigen::Vector3d travel{0, 0, 0};  ///< m: there and back once a period
+  double period = 1;                ///< s
+};
+
 /// What is simulated: one mesh whose parts have no common vertices, its material, and its state at the start.
 struct SimulatedMesh {
   Positions positions, velocities;
   EdgeList edges;  ///< all edges of the faces, once each
   FaceList faces;
-  std::vector<double> mass;          ///< [vertex], kg
-  std::vector<std::uint8_t> fixed;   ///< [vertex], 1 for vertices that never move
+  std::vector<double> mass;         ///< [vertex], kg
+  std::vector<std::uint8_t> fixed;  ///< [vertex], 1 for vertices that never move
+  std::vector<std::int32_t> joint;  ///< [vertex], the joint that a driven vertex follows; -1: none
+  std::vector<std::uint8_t>
+      obstacle;                      ///< [vertex]: 1: elements of such vertices alone do not touch each other
   std::vector<std::uint32_t> inner;  ///< vertices of no face, ascending: they touch nothing
   std::vector<Spring> springs;
   std::vector<Hinge> hinges;
+  std::vector<Joint> joints;
 
   std::uint32_t vertex_count() const { return std::uint32_t(positions.rows()); }
+  bool is_driven(std::uint32_t vertex) const { return joint[vertex] >= 0; }
+  /// Returns whether forces alone decide where a vertex goes.
+  bool is_free(std::uint32_t vertex) const { return fixed[vertex] == 0 && !is_driven(vertex); }
 };
 
 /// What holds for a whole simulation.
@@ -63,7 +83,7 @@ struct Simulated {
   Physics physics;
 };
 
-/// Returns the names of the scenes: sphere, cloths, sheets, stack.
+/// Returns the names of the scenes: sphere, cloths, sheets, stack, walker, knot.
 const std::vector<std::string>& scene_names();
 /// Returns what a scene shows, in a sentence. Throws std::invalid_argument for an unknown name.
 std::string scene_title(const std::string& name);
@@ -73,6 +93,10 @@ std::string scene_title(const std::string& name);
 ///   cloths: a cloth falls onto a cloth that is held at its corners
 ///   sheets: sheets fall, turned at random, onto a floor and onto each other
 ///   stack:  soft boxes fall onto a floor and onto each other
+///   walker: three skirts, one over the other, on a figure that walks in a circle
+///   knot:   a rope with an overhand knot is pulled at its ends and let go, again and again; its
+///   cross-section
+///           has at least 5 corners, which takes about 600 triangles
 Simulated make_scene(const std::string& name, std::uint64_t triangles, std::uint64_t seed);
 
 /// Composes meshes from parts.
@@ -89,15 +113,42 @@ class MeshBuilder {
     double stretch = 500;       ///< N/m, of a spring
     double bending = 2e-5;      ///< N m
   };
+  /// The grid of a surface of columns x rows vertices.
+  struct Grid {
+    std::uint32_t columns, rows;
+    bool closed;  ///< the last column is joined to the first one: a tube
+  };
+  /// A rope of rings, each with its centre.
+  struct Rope {
+    std::span<const Eigen::Vector3d> line;  ///< the centres of its rings, at equal distances; at least 4
+    std::uint32_t sides = 8;                ///< corners of a ring, at least 3
+    double radius = 0.01;                   ///< m
+    double density = 300;                   ///< kg/m^3
+    double modulus = 1e5;                   ///< N/m^2
+  };
   /// A body that never moves.
   void add_obstacle(std::span<const Eigen::Vector3d> vertices,
                     std::span<const Eigen::Vector3<std::uint32_t>> faces);
+  /// A body that follows a joint. Its parts do not touch each other.
+  void add_driven_obstacle(std::span<const Eigen::Vector3d> vertices,
+                           std::span<const Eigen::Vector3<std::uint32_t>> faces, std::int32_t joint);
   /// A square cloth of side x side vertices, cut into triangles. Returns its first vertex.
   std::uint32_t add_cloth(const Sheet& sheet, const Material& material);
+  /// A cloth over a grid whose vertex (x, y) is at points[y * columns + x]. Returns its first vertex.
+  std::uint32_t add_cloth(const Grid& grid, std::span<const Eigen::Vector3d> points,
+                          const Material& material);
+  /// A soft rope with closed ends: springs within each ring and between neighbours. Returns its first vertex;
+  /// ring i has the vertices (sides + 1) i to (sides + 1) i + sides, of which the last is its centre.
+  std::uint32_t add_rope(const Rope& rope);
   /// A soft box of cells^3 cells: springs along edges and diagonals of the cells. Returns its first vertex.
   std::uint32_t add_soft_box(const Eigen::Vector3d& low, double side, std::uint32_t cells, double density,
                              double stiffness);
-  void fix(std::uint32_t vertex) { fixed_[vertex] = 1; }
+  void fix(std::uint32_t vertex) { fixed_[vertex] = obstacle_[vertex] = 1; }
+  /// Adds a joint and returns its number.
+  std::int32_t add_joint(const Joint& joint);
+  /// Lets a vertex follow a joint: a particle of 1 kg, whose flight without forces is the script. Contact can
+  /// hold it back a little (StepReport::lag).
+  void drive(std::uint32_t vertex, std::int32_t joint);
   void move(std::uint32_t vertex, const Eigen::Vector3d& by) { vertices_[vertex] += by; }
   /// Returns the mesh, with its edges, inner vertices, and no velocity.
   SimulatedMesh finish() const;
@@ -111,7 +162,9 @@ class MeshBuilder {
   std::vector<Eigen::Vector3d> vertices_;
   std::vector<Eigen::Vector3<std::uint32_t>> faces_;
   std::vector<double> mass_;
-  std::vector<std::uint8_t> fixed_;
+  std::vector<std::uint8_t> fixed_, obstacle_;
+  std::vector<std::int32_t> joint_;
+  std::vector<Joint> joints_;
   std::vector<Spring> springs_;
   std::vector<Hinge> hinges_;
 };

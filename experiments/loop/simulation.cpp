@@ -1,6 +1,7 @@
 #include "experiments/loop/simulation.hpp"
 
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <cmath>
@@ -33,20 +34,33 @@ json identity_of(const SimulationOptions& options) {
           {"record", options.record}, {"frames_every", options.frames_every}};
 }
 
+/// Returns how many of the first faces belong to obstacles.
+std::uint64_t leading_obstacle_faces(const SimulatedMesh& mesh) {
+  for (Eigen::Index f = 0; f < mesh.faces.rows(); ++f)
+    for (int k = 0; k < 3; ++k)
+      if (mesh.obstacle[mesh.faces(f, k)] == 0) return std::uint64_t(f);
+  return std::uint64_t(mesh.faces.rows());
+}
+
 json header_record(const SimulationOptions& options, const Simulated& scene) {
   const Physics& physics = scene.physics;
   const SimulatedMesh& mesh = scene.mesh;
-  std::uint64_t fixed = 0;
-  for (const std::uint8_t one : mesh.fixed) fixed += one;
+  std::uint64_t fixed = 0, driven = 0;
+  for (std::uint32_t v = 0; v < mesh.vertex_count(); ++v) {
+    fixed += mesh.fixed[v];
+    driven += mesh.is_driven(v) ? 1 : 0;
+  }
   return {{"schema", "kbvh-loop-1"},
           {"options", identity_of(options)},
           {"title", scene_title(options.scene)},
           {"mesh",
            {{"vertices", mesh.vertex_count()},
             {"fixed_vertices", fixed},
+            {"driven_vertices", driven},
             {"inner_vertices", mesh.inner.size()},
             {"edges", mesh.edges.rows()},
             {"faces", mesh.faces.rows()},
+            {"obstacle_faces", leading_obstacle_faces(mesh)},
             {"springs", mesh.springs.size()},
             {"hinges", mesh.hinges.size()}}},
           {"physics",
@@ -63,6 +77,14 @@ json header_record(const SimulationOptions& options, const Simulated& scene) {
           {"dirty", dirty()},
           {"machine", machine()},
           {"when", now_utc()}};
+}
+
+/// Returns the resident memory of this program in bytes; 0 where the system does not tell.
+std::uint64_t resident_memory() {
+  std::ifstream in("/proc/self/statm");
+  std::uint64_t whole = 0, resident = 0;
+  in >> whole >> resident;
+  return in ? resident * std::uint64_t(::sysconf(_SC_PAGESIZE)) : 0;
 }
 
 /// Returns the largest resident memory of this program so far, in bytes.
@@ -166,8 +188,10 @@ json step_record(const StepReport& report, const State& state, double time_step)
               {"ending", name(report.ending)},
               {"iterates", report.iterates},
               {"evaluations", report.evaluations},
+              {"orders", report.orders},
               {"contacts", report.contacts},
               {"smallest_gap_m", report.smallest_gap},
+              {"lag_m", report.lag},
               {"kinetic_j", report.kinetic},
               {"gravitational_j", report.gravitational},
               {"elastic_j", report.elastic},
@@ -228,6 +252,7 @@ SimulationResult simulate(const SimulationOptions& options, const std::function<
     record["impact_ms"] = 1e3 * impact;
     record["rest_ms"] = 1e3 * rest;
     record["memory_bytes"] = finder.bytes() + step.bytes();
+    record["resident_bytes"] = resident_memory();
     record["peak_resident_bytes"] = peak_memory();
     files.write(record);
     files.save_frame_of(saved.state);

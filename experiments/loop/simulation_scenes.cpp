@@ -5,32 +5,12 @@
 #include <map>
 #include <stdexcept>
 
-#include "experiments/loop/simulated_mesh.hpp"
+#include "experiments/loop/scene_parts.hpp"
 
 namespace kbvh::experiments::loop {
 namespace {
 
 using Vector3 = Eigen::Vector3d;
-
-/// Numbers that are equal on every machine (SplitMix64).
-class SceneChance {
- public:
-  explicit SceneChance(std::uint64_t seed) : state_(seed) {}
-  /// Returns a number in [-1, 1).
-  double about_zero() {
-    std::uint64_t z = state_ += 0x9e3779b97f4a7c15ull;
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
-    return double((z ^ (z >> 31)) >> 11) * 0x1p-52 - 1;
-  }
-  Vector3 vector() {
-    const double x = about_zero(), y = about_zero(), z = about_zero();
-    return {x, y, z};
-  }
-
- private:
-  std::uint64_t state_;
-};
 
 /// Returns the vertices a side of a cloth with about this many triangles.
 std::uint32_t cloth_side(double triangles) {
@@ -155,7 +135,9 @@ constexpr SceneEntry scene_table[] = {
     {"sphere", "a square cloth falls onto a sphere at rest", sphere_scene},
     {"cloths", "a cloth falls onto a cloth that is held at its corners", cloths_scene},
     {"sheets", "six sheets fall, turned at random, onto a floor and onto each other", sheets_scene},
-    {"stack", "three soft boxes fall onto a floor and onto each other", stack_scene}};
+    {"stack", "three soft boxes fall onto a floor and onto each other", stack_scene},
+    {"walker", "three skirts, one over the other, on a figure that walks in a circle", walker_scene},
+    {"knot", "a rope with an overhand knot is pulled at its ends and let go, again and again", knot_scene}};
 
 const SceneEntry& scene_named(const std::string& name) {
   for (const SceneEntry& entry : scene_table)

@@ -1,7 +1,8 @@
 #include "experiments/run/time_left.hpp"
 
 #include <algorithm>
-#include <cmath>
+
+#include "experiments/common/steps_left.hpp"
 
 namespace kbvh::experiments {
 
@@ -83,11 +84,7 @@ double TimeLeft::seconds() const {
 }
 
 std::string TimeLeft::said() const {
-  const double left = seconds();
-  if (left < 0) return {};
-  if (left < 95)
-    return "about " + std::to_string(std::max(10, 10 * int(std::lround(left / 10)))) + " s left: ";
-  return "about " + std::to_string(std::lround(left / 60)) + " min left: ";
+  return time_left_in_words(seconds());
 }
 
 }  // namespace kbvh::experiments

@@ -27,7 +27,7 @@ class TimeLeft {
 
   /// Returns the estimated seconds, or a negative number while too little is known.
   double seconds() const;
-  /// Returns "about 40 s left: ", "about 3 min left: ", or "".
+  /// Returns it as time_left_in_words does.
   std::string said() const;
 
  private:

@@ -18,12 +18,14 @@ TEST_F(Binary, LoopRunsRecordsAndReplays) {
   EXPECT_EQ(lines[0].at("schema"), "kbvh-loop-1");
   EXPECT_EQ(lines[0].at("options").at("scene"), "sphere");
   EXPECT_EQ(lines[12].at("step"), 12);
+  EXPECT_GT(lines[12].at("resident_bytes").get<double>(), 1e6);
+  EXPECT_NE(run.out.find("memory, MB"), std::string::npos) << run.out;
   for (const char* key :
        {"time_s",    "ending",     "iterates",        "evaluations",    "questions",
         "searches",  "candidates", "contacts",        "smallest_gap_m", "penetrations",
         "detect_ms", "impact_ms",  "rest_ms",         "kinetic_j",      "gravitational_j",
         "elastic_j", "barrier_j",  "momentum_kg_m_s", "memory_bytes",   "peak_resident_bytes",
-        "state"})
+        "state",     "orders",     "lag_m",           "resident_bytes"})
     EXPECT_TRUE(lines[12].contains(key)) << key;
   EXPECT_TRUE(std::filesystem::exists(folder_ / "out" / "frames" / "frame_000012.obj"));
 

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "core/geometry/triangle_triangle.hpp"
@@ -13,9 +12,9 @@
 #include "experiments/io/animated_mesh.hpp"
 #include "experiments/io/bytes.hpp"
 #include "experiments/io/frames.hpp"
-#include "experiments/loop/penetration.hpp"
 #include "experiments/loop/player.hpp"
 #include "experiments/loop/simulation.hpp"
+#include "loop_simulator.hpp"
 #include "tests/program/temporary_folder.hpp"
 #include "tests/support/random.hpp"
 
@@ -32,35 +31,6 @@ SimulationOptions small(const std::string& scene, std::uint64_t steps) {
   options.steps = steps;
   return options;
 }
-
-std::vector<json> lines_of(const std::filesystem::path& file) {
-  std::vector<json> lines;
-  std::ifstream in(file);
-  for (std::string line; std::getline(in, line);) lines.push_back(json::parse(line));
-  return lines;
-}
-
-/// A simulation that is stepped by the test.
-struct Simulator {
-  explicit Simulator(Simulated simulated, Detection detection = Detection::refit, double keep = 0)
-      : scene(std::move(simulated)),
-        mesh(scene.mesh),
-        finder(mesh, {detection, keep, scene.physics.radius(), 0}),
-        step(scene, finder),
-        state(first_state(scene.mesh)) {}
-  Simulator(const Simulator&) = delete;
-  Simulator& operator=(const Simulator&) = delete;
-  StepReport advance() { return step.advance(state); }
-  std::uint64_t intersecting_pairs() const {
-    return PenetrationCheck(scene.mesh).intersecting_pairs(state.positions);
-  }
-
-  Simulated scene;
-  ContactMesh mesh;
-  ContactFinder finder;
-  ImplicitStep step;
-  State state;
-};
 
 class EveryScene : public testing::TestWithParam<std::string> {};
 
@@ -324,7 +294,7 @@ TEST_F(Recorded, HoldsEveryIterate) {
   RecordingReader reader(file_);
   EXPECT_TRUE(reader.header().mesh.edges == scene.mesh.edges);
   EXPECT_TRUE(reader.header().mesh.faces == scene.mesh.faces);
-  EXPECT_EQ(reader.header().mesh.fixed, scene.mesh.fixed);
+  EXPECT_EQ(reader.header().mesh.obstacle, scene.mesh.obstacle);
   EXPECT_EQ(reader.header().mesh.inner, scene.mesh.inner);
   EXPECT_EQ(reader.header().radius, scene.physics.radius());
   EXPECT_EQ(reader.header().separation, scene.physics.thickness);
@@ -412,7 +382,7 @@ TEST_F(Recorded, DamageIsRefused) {
   EXPECT_TRUE(refused(with(15, '\x7f')));  // vertices
   EXPECT_TRUE(refused(with(23, '\x7f')));  // faces
   EXPECT_TRUE(refused(with(35, '\xff')));  // a negative radius
-  EXPECT_TRUE(refused(with(44, 2)));       // neither fixed nor free
+  EXPECT_TRUE(refused(with(44, 2)));       // neither of an obstacle nor free
   std::uint32_t vertices = 0;
   std::memcpy(&vertices, whole.data() + 12, 4);
   EXPECT_TRUE(refused(with(44 + vertices + 3, 1)));      // an edge that names no vertex
