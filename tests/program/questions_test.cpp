@@ -101,7 +101,7 @@ TEST_F(Binary, PairsWithinBodiesAreCountedWhereTheyAreAskedFor) {
   write_text(folder_ / "tent.obj",
              "v 0 0 0\nv 1 0 1\nv 0 1 0\nv 1 0 0\nv 0 0 1\nv 1 1 0\nf 1 2 3\nf 4 5 6\n");
   const std::string bodies =
-      "--body tent.obj,translate=0:0:9 --l 1 --repetitions 1 --strategies bottom_up,linear_bounds ";
+      "--body tent.obj,translate=0:0:9 --l 1 --repetitions 1 --strategies bottom_up,hybrid ";
   const auto pairs = [&](const std::string& more, const std::string& out) {
     const Outcome run = kbvh("run " + bodies + more + "--out " + out);
     EXPECT_EQ(run.code, 0) << run.err;
