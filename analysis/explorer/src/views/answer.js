@@ -1,4 +1,4 @@
-// Three questions, and what the results answer: a name, an interval and a curve.
+// Four questions, and what the results answer: a name, an interval and a curve.
 import { ASKS, FRAMES, KNOWN, PAIRS, SIZES, classOf, countedCells, matches, nearest, ranked } from "../advice.js";
 import { tableOf } from "../chart.js";
 import { choice, make, symbol } from "../dom.js";

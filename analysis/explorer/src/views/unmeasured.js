@@ -1,5 +1,5 @@
 // What the page says to a choice that the results have no measurements of: that they have none, what the project has measured, what is near.
-import { ASKS, FRAMES, KNOWN, SIZES, rankedKept } from "../advice.js";
+import { ASKS, FRAMES, KNOWN, SIZES, nearest, rankedKept } from "../advice.js";
 import { tableOf } from "../chart.js";
 import { make } from "../dom.js";
 import { factor, milliseconds, plural, sentence } from "../words.js";
@@ -17,6 +17,9 @@ export function unmeasured({ model, state, set }, found, best) {
   const own = found.kept.length ? rankedKept(kept, found.kept, state.know)[0] : null;
   const largest = found.own.map(({ cell }) => cell).reduce((most, cell) => (most && most.primitives >= cell.primitives ? most : cell), null);
   const above = largest && found.size !== "any" && SIZES[found.size].from > largest.primitives ? ` Nothing above ${largest.size} was.` : "";
+  const other = !own && !found.scene ? nearest(found.known.map((cell) => ({ cell })), found.size, found.frames) : null;
+  const lead = ({ frames, size }) =>
+    make("button", { type: "button", class: "quiet", text: situation(frames, size), click: () => set({ frames, large: size }) });
   const scene = found.scene ? `${found.scene}, ` : "";
   return make(
     "section",
@@ -33,15 +36,11 @@ export function unmeasured({ model, state, set }, found, best) {
         "p",
         { class: own ? "note nearest" : "nearest" },
         "Nearest in these results: ",
-        make("button", {
-          type: "button",
-          class: "quiet",
-          text: situation(found.near.frames, found.near.size),
-          click: () => set({ frames: found.near.frames, large: found.near.size }),
-        }),
+        lead(found.near),
         `. There, where ${KNOWN[state.know].words}, take ${best.contestant.title}: ${costText(model, best)}; ${speedText(best)}.`,
       ),
-    !own && !best && make("p", { text: "Nothing near it was measured, either." }),
+    other && make("p", { class: "kept-near" }, "The project's own measurements have it with ", lead(other), "."),
+    !own && !best && !other && make("p", { text: "Nothing near it was measured, either." }),
   );
 }
 
