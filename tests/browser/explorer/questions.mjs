@@ -169,7 +169,7 @@ const press = (page, text) =>
 /** Expects every dashed choice, and no other, to be named by the line below its question. */
 async function reasons(page) {
   const groups = await page.$$eval(".question-of", (list) =>
-    list.map((one) => [[...one.querySelectorAll("button.absent")].map((button) => button.textContent), one.querySelector(".reason")?.textContent ?? "", one.querySelectorAll(":disabled").length]),
+    list.map((one) => [[...one.querySelectorAll("button.unmeasured")].map((button) => button.textContent), one.querySelector(".reason")?.textContent ?? "", one.querySelectorAll(":disabled").length]),
   );
   assert.equal(groups.length, 4);
   for (const [absent, said, disabled] of groups) {

@@ -64,7 +64,7 @@ function buttons(question, options, chosen, change, absent, reason) {
       Object.entries(options).map(([key, name]) =>
         make("button", {
           type: "button",
-          class: absent?.(key) ? "absent" : null,
+          class: absent?.(key) ? "unmeasured" : null,
           text: name,
           "aria-pressed": String(key === chosen),
           click: () => change(key),

@@ -17,7 +17,8 @@ export function unmeasured({ model, state, set }, found, best) {
   const own = found.kept.length ? rankedKept(kept, found.kept, state.know)[0] : null;
   const largest = found.own.map(({ cell }) => cell).reduce((most, cell) => (most && most.primitives >= cell.primitives ? most : cell), null);
   const above = largest && found.size !== "any" && SIZES[found.size].from > largest.primitives ? ` Nothing above ${largest.size} was.` : "";
-  const other = !own && !found.scene ? nearest(found.known.map((cell) => ({ cell })), found.size, found.frames) : null;
+  const known = !own && !found.scene ? nearest(found.known.map((cell) => ({ cell })), found.size, found.frames) : null;
+  const other = known && !(best && known.frames === found.near.frames && known.size === found.near.size) ? known : null;
   const lead = ({ frames, size }) =>
     make("button", { type: "button", class: "quiet", text: situation(frames, size), click: () => set({ frames, large: size }) });
   const scene = found.scene ? `${found.scene}, ` : "";
@@ -37,7 +38,7 @@ export function unmeasured({ model, state, set }, found, best) {
         { class: own ? "note nearest" : "nearest" },
         "Nearest in these results: ",
         lead(found.near),
-        `. There, where ${KNOWN[state.know].words}, take ${best.contestant.title}: ${costText(model, best)}; ${speedText(best)}.`,
+        `. There, where ${KNOWN[state.know].words}, take ${best.contestant.title}: ${costText(model, best)}${best.cells === 1 ? ` on ${best.own[0].cell.title}` : ""}; ${speedText(best)}.`,
       ),
     other && make("p", { class: "kept-near" }, "The project's own measurements have it with ", lead(other), "."),
     !own && !best && !other && make("p", { text: "Nothing near it was measured, either." }),
