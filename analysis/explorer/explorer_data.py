@@ -6,19 +6,22 @@ a test compares the two.
 
 from __future__ import annotations
 
+import json
 import math
 import re
+from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Optional
 
 import pandas as pd
 
-from advice import advice, summary
+from advice import advice, cells_file, summary
 from claims import claim_pictures, claims as paper_claims
 from figures import colours
 from ratios import profiles
 from results import clip_times, text
-from results.load import PHASES, SUMS, Study
+from results.load import PHASES, SUMS, ResultError, Study
 
 SCHEMA = "kbvh-explorer-1"
 
@@ -116,8 +119,36 @@ def data(study: Study, title: str, claims: Optional[paper_claims.Claims], folder
         "runs": columns,
         "palette": colours.palette(),
         "claims": _claims(known),
+        "kept": kept(),
         "reference": known.reference if known else "",
         "report": "report.html" if (folder / "report.html").exists() else "",
+    }
+
+
+def kept(file: Path = summary.REFERENCE / cells_file.FILE) -> Optional[dict[str, Any]]:
+    """Returns the cells that come with the project, for questions that the results do not answer; None without such a file.
+
+    Raises ResultError for a cell whose title has no size or no l.
+    """
+    if not file.exists():
+        return None
+    found = cells_file.read(file)
+    cells = []
+    for cell in found.cells:
+        parts = re.search(r", ([\d.]+)([kM]?), l = ([\d.]+)", cell.title)
+        if parts is None:
+            raise ResultError(f"{file}: the cell {cell.title} has no size or no l in its title.")
+        cells.append({
+            "title": cell.title, "asks": cell.asks, "size": parts[1] + parts[2],
+            "primitives": number(float(parts[1]) * {"": 1, "k": 1e3, "M": 1e6}[parts[2]], 3), "l": number(float(parts[3])),
+            "refit": cell.best_refit, "speeds": {id: number(speed, 4) for id, speed in cell.speeds.items()},
+            "times": {id: number(time, 4) for id, time in cell.times.items()}, "doubtful": sorted(cell.doubtful),
+        })  # fmt: skip
+    facts = {id: fact for cell in found.cells for id, fact in cell.facts.items()}
+    return {
+        "told": found.told.replace("`", ""),
+        "strategies": {id: [one.title, one.foresight.replace("_", " "), one.baseline] for id, one in sorted(facts.items())},
+        "cells": cells,
     }
 
 
@@ -260,11 +291,41 @@ def _reconstructed(row: pd.Series) -> dict[str, Any]:
 
 
 def _claims(known: Optional[summary.Paper]) -> list[dict[str, Any]]:
-    """Returns the claims of the paper, each with its verdict, whose it is, and its picture of these results."""
+    """Returns the claims of the paper, experiments first, each with its verdict, whose it is, its ranges and its picture of these results."""
     if known is None:
         return []
-    return [
+    file = summary.REFERENCE / "claims.json"
+    kept = {one["id"]: one for one in json.loads(file.read_text(encoding="utf-8"))["claims"]} if file.exists() else {}
+
+    def ranges(one: summary.Verdict) -> list[list[str]]:
+        if one.source == summary.HERE:
+            return corners([asdict(corner) for corner in one.row.corners], one.row.ours)
+        return corners(kept[one.row.id]["corners"], kept[one.row.id]["ours"]) if one.row.id in kept else []
+
+    found = [
         {"id": one.row.id, "claim": one.row.claim, "paper": one.row.paper, "verdict": one.verdict, "source": one.source, "brief": one.brief,
+         "corners": ranges(one),
          "picture": str(claim_pictures.picture(one.row.looked, one.row.checks)) if one.source == summary.HERE else ""}
         for one in known.verdicts if one.source
     ]  # fmt: skip
+    return sorted(found, key=lambda one: not one["id"].startswith("E"))
+
+
+def corners(listed: Sequence[dict[str, Any]], ours: dict[str, str]) -> list[list[str]]:
+    """Returns a claim's corners as [name, range without motion evaluation, verdict].
+
+    `ours` has the ranges of a corner by its id: one for each check that has the corner, as in "kinetic AABB tree: 0.1 to 0.5; kinetic
+    BoxTree: 0.2 to 0.7". A claim with several checks names the check of each corner.
+    """
+    several = len({one["check"] for one in listed}) > 1
+    seen: dict[str, int] = {}
+    found = []
+    for one in listed:
+        at = seen[one["id"]] = seen.get(one["id"], -1) + 1
+        parts = ours.get(one["id"], "").split("; ")
+        if at >= len(parts) or not parts[at]:
+            continue
+        label, _, span = parts[at].rpartition(": ")
+        name = f"{label}: {one['name']}" if several and label and label != one["name"].removeprefix("the ") else one["name"]
+        found.append([name, span.split(",")[0], one["verdict"]])
+    return found

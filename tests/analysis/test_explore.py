@@ -140,6 +140,36 @@ class TestData(Folder):
         self.assertIn("why", again[3])
         self.assertEqual(data["runs"]["limit"], [7, 0, 0, 0])
 
+    def test_cells_of_the_project_have_sizes_and_what_the_rule_needs(self) -> None:
+        file = explorer_data.summary.REFERENCE / "cells.json"
+        kept = explorer_data.kept(file)
+        assert kept is not None
+        raw = json.loads(file.read_text())
+        self.assertEqual([one["title"] for one in kept["cells"]], [one["title"] for one in raw["cells"]])
+        for one, other in zip(kept["cells"], raw["cells"]):
+            self.assertIn(f", {one['size']}, l = {one['l']:g}", one["title"])
+            self.assertEqual(set(one["speeds"]), set(other["speeds"]))
+            self.assertAlmostEqual(one["speeds"][one["refit"]], 1)
+        sizes = {one["title"]: one["primitives"] for one in kept["cells"]}
+        self.assertEqual((sizes["dress 65k, 85k, l = 1"], sizes["diffcloth t-shirt, 4k, l = 1"]), (85_000, 4_000))
+        self.assertIn("commit", kept["told"])
+        self.assertLess(len(json.dumps(kept)), 60_000)
+        self.assertIsNone(explorer_data.kept(self.folder / "none.json"))
+
+    def test_a_cell_of_the_project_without_a_size_is_refused(self) -> None:
+        file = self.folder / "cells.json"
+        file.write_text((explorer_data.summary.REFERENCE / "cells.json").read_text().replace("dress 65k, 85k, l = 1", "dress, l = 1", 1))
+        with self.assertRaisesRegex(load.ResultError, "has no size"):
+            explorer_data.kept(file)
+
+    def test_ranges_of_a_claim_name_their_structures(self) -> None:
+        listed = [{"check": check, "id": id, "name": name, "verdict": "holds"}
+                  for check, id, name in (("trees", "a", "as then"), ("trees", "b", "best"), ("boxes", "a", "as then"))]  # fmt: skip
+        ours = {"a": "trees: 0.1 to 0.5, 0.2 to 0.6 (with motion); boxes: 2 to 3, 4 (with motion)", "b": "trees: 7"}
+        self.assertEqual(explorer_data.corners(listed, ours),
+                         [["trees: as then", "0.1 to 0.5", "holds"], ["trees: best", "7", "holds"], ["boxes: as then", "2 to 3", "holds"]])  # fmt: skip
+        self.assertEqual(explorer_data.corners(listed[:2], {"a": "0.1 to 0.5, 1 (with motion)"}), [["as then", "0.1 to 0.5", "holds"]])
+
     def test_is_json_without_nan(self) -> None:
         hidden = line("bottom_up", [1.0])
         hidden["verified"]["audited"] = False

@@ -4,7 +4,7 @@ import { geometricMean, quotient } from "./statistics.js";
 
 /** What may be known of the future, and the foresight of strategies that need to know no more. */
 export const KNOWN = {
-  none: { name: "Nothing", words: "nothing is known", allowed: ["", "none"] },
+  none: { name: "Nothing: positions only", words: "nothing is known", allowed: ["", "none"] },
   next: {
     name: "The next keyframe",
     words: "the next keyframe is known",
@@ -33,6 +33,9 @@ export const SIZES = {
 };
 
 export const PAIRS = "pairs of two bodies";
+
+/** Questions that every page has, by their names in cells, as users call them. */
+export const ASKS = { [PAIRS]: "two bodies", "pairs within a body, too": "one body with itself, too", rays: "rays with bodies" };
 
 export const classOf = (classes, number) =>
   Object.keys(classes).find((key) => key !== "any" && classes[key].from <= number && number < classes[key].to);
@@ -99,4 +102,41 @@ export function situations(model) {
       return [{ asks, frames: FRAMES[frames].words, cells: own.length, advice }];
     }),
   );
+}
+
+/** Ranks the strategies by cells that come with the project (`kept` of the data), by the same rule. */
+export function rankedKept(kept, cells, known) {
+  const found = [];
+  for (const id of Object.keys(kept.strategies).sort()) {
+    const [title, foresight, baseline] = kept.strategies[id];
+    const own = cells.filter((cell) => id in cell.speeds);
+    if (!KNOWN[known].allowed.includes(foresight) || !own.length || 2 * own.length < cells.length) continue;
+    const speeds = own.map((cell) => cell.speeds[id]);
+    const low = Math.min(...speeds);
+    found.push({
+      ...{ id, contestant: { title, baseline }, low, high: Math.max(...speeds), own, cells: cells.length },
+      speed: geometricMean([...speeds, ...Array(cells.length - own.length).fill(low)]),
+      bestIn: own.filter((cell) => cell.refit === id).length,
+      disturbed: own.some((cell) => cell.doubtful.includes(id)),
+    });
+  }
+  return found.sort((a, b) => b.speed - a.speed);
+}
+
+/** Whether a cell (of the results or kept) has a size and an l of these classes; "" passes all. */
+export const matches = (cell, size, frames) =>
+  (!size || size === "any" || classOf(SIZES, cell.primitives) === size) && (!frames || classOf(FRAMES, cell.l) === frames);
+
+/** Returns the cells of the classes that are nearest to those asked for, l before the size: {size, frames, cells}; null without cells. */
+export function nearest(every, size, frames) {
+  const [sizes, classes] = [Object.keys(SIZES).filter((key) => key !== "any"), Object.keys(FRAMES)];
+  const away = (list, one, other) => (one === "any" ? 0 : Math.abs(list.indexOf(one) - list.indexOf(other)));
+  let best = null;
+  for (const own of classes)
+    for (const of of size === "any" ? ["any"] : sizes) {
+      const cells = every.filter(({ cell }) => matches(cell, of, own));
+      const distance = 10 * away(classes, frames, own) + away(sizes, size, of);
+      if (cells.length && (!best || distance < best.distance)) best = { size: of, frames: own, cells, distance };
+    }
+  return best;
 }

@@ -21,6 +21,7 @@ import { scaling } from "./views/scaling.js";
 import { pairs, sources, versus } from "./views/versus.js";
 import { plural } from "./words.js";
 
+const QUESTION = "Which BVH update to take?";
 const begun = performance.now();
 const given = JSON.parse(document.getElementById("data").textContent);
 let model = modelOf(given);
@@ -183,6 +184,7 @@ function drawView() {
   const count = selected(model, state).length;
   const nothing = count === 0 && !["answer", "claims"].includes(name);
   document.body.classList.toggle("answering", name === "answer");
+  document.body.classList.toggle("unfiltered", ["answer", "claims"].includes(name));
   host.view.replaceChildren(
     ...(nothing
       ? [make("p", { class: "lead", text: "No run passes these filters." })]
@@ -244,12 +246,9 @@ function markChosen() {
 function header() {
   const { data } = model;
   const named = data.plans.filter((plan) => plan.name);
-  // A study's question is the title; of several, a list that the filter of studies chooses from.
+  // A page asks its question; what the study was made for, and its numbers, fold out.
   const names = named.map((plan) => plan.name);
-  const title =
-    data.title ||
-    (names.length > 3 ? plural(names.length, "study").replace("studys", "studies") : names.join(" · ")) ||
-    document.title;
+  const study = names.length > 3 ? plural(names.length, "study").replace("studys", "studies") : names.join(" · ");
   const about =
     named.length === 1
       ? [make("p", { class: "question", text: named[0].description })]
@@ -291,7 +290,7 @@ function header() {
     make(
       "div",
       { class: "title" },
-      make("h1", { text: title }),
+      make("h1", { text: data.title || QUESTION }),
       make(
         "div",
         { class: "actions" },
@@ -310,7 +309,7 @@ function header() {
     make(
       "details",
       { class: "notes" },
-      make("summary", { text: facts.slice(0, 4).join(" · ") }),
+      make("summary", { text: ["How this study was made", study, ...facts.slice(0, 4)].filter(Boolean).join(" · ") }),
       about,
       make("p", { class: "facts", text: facts.slice(4).join(" · ") }),
     ),
@@ -342,7 +341,7 @@ async function read(files) {
   host.said.textContent = `Reading ${names}`;
   try {
     const texts = await Promise.all([...files].map((file) => file.text()));
-    model = modelOf(dataOf(texts.join("\n"), names, given.palette));
+    model = modelOf({ ...dataOf(texts.join("\n"), names, given.palette), kept: given.kept });
   } catch (problem) {
     host.problem.textContent = `${names} cannot be shown: ${problem.message}`;
     host.problem.hidden = false;

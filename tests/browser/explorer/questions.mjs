@@ -1,4 +1,4 @@
-// Filters, links, and the answer to three questions.
+// Filters, links, and the answer to four questions.
 import assert from "node:assert/strict";
 
 import { check, drawn, expected, leave, load, open } from "../support/explorer.mjs";
@@ -59,10 +59,11 @@ await check("states survive their links, strange names included", async () => {
   leave(page);
 });
 
-await check("a study's question is the title, and its text stays text", async () => {
+await check("the page asks its question, and the text of a study stays text", async () => {
   const page = await open("merged", "#view=overview");
   assert.equal(await page.title(), "is it faster?");
-  assert.equal(await page.$eval("h1", (one) => one.textContent), "is it faster?");
+  assert.equal(await page.$eval("h1", (one) => one.textContent), "Which BVH update to take?");
+  assert.match(await page.$eval(".notes summary", (one) => one.textContent), /^How this study was made · is it faster\? · \d+ runs/);
   assert.match(await page.$eval(".question", (one) => one.textContent), /<script>alert\(1\)<\/script>/);
   assert.ok(
     (await page.$$eval(".matrix tbody .scene", (list) => list.map((one) => one.textContent))).some((text) =>
@@ -86,11 +87,23 @@ await check("claims have verdicts, say whose they are, and add up", async () => 
     const tally = await page.$eval(".tally", (one) => one.textContent);
     const counted = [...tally.matchAll(/(?:holds|condition|hold) (\d+)/g)].reduce((sum, [, count]) => sum + Number(count), 0);
     assert.equal(counted, claims.length, tally);
+    const experiments = claims.filter((claim) => claim.id.startsWith("E")).length;
+    assert.ok(experiments > 5 && claims.slice(0, experiments).every((claim) => claim.id.startsWith("E")), "experiments first");
+    assert.equal((await page.$$(".claim[open]")).length, 0, "folded");
+    assert.equal(await page.$eval("#filters", (one) => getComputedStyle(one).display), "none", "no filters: claims do not depend on them");
+    const six = claims.find((claim) => claim.id === "E6");
+    const [, range] = six.corners.find(([name]) => /BoxTree/.test(name));
+    assert.match(range, /^[\d.]+( to [\d.]+)?$/);
+    assert.ok(six.corners.some(([name]) => /AABB/.test(name)) && six.corners.every(([name]) => /BoxTree|AABB/.test(name)), "each range has its structure");
+    await page.click("#claim-E6 summary");
+    assert.ok((await page.$eval("#claim-E6 .corners", (one) => one.innerText)).includes(range));
+    assert.doesNotMatch(await page.$eval("#claim-E6", (one) => one.textContent), /Measured: /, "no range without its structure");
+    await page.click("#claim-E6 summary");
     leave(page);
   }
 });
 
-// --- three questions, one answer --------------------------------------------------------------------------------
+// --- four questions, one answer --------------------------------------------------------------------------------
 
 for (const which of ["reference", "merged"])
   await check(`${which}: the rule takes what the report takes`, async () => {
@@ -119,7 +132,7 @@ for (const which of ["reference", "merged"])
     leave(page);
   });
 
-await check("three questions are answered by a name, an interval and a curve", async () => {
+await check("four questions are answered by a name, an interval and a curve", async () => {
   const page = await open("reference");
   const said = () => page.$eval(".answer", (one) => one.textContent);
   const press = (text) =>
@@ -137,7 +150,7 @@ await check("three questions are answered by a name, an interval and a curve", a
   await press("The next keyframe");
   assert.match(
     await said(),
-    new RegExp(`^Take ${await rule(1, "10 frames a keyframe and more")}: [\\d.]+ to [\\d.]+ ms a frame\\.That is [\\d.]+ times as fast as the best refit \\([\\d.]+ to [\\d.]+ in \\d+ cells\\)\\.`),
+    new RegExp(`^Take ${await rule(1, "10 frames a keyframe and more")}: [\\d.]+ ms \\([\\d.]+[kM]?\\) to [\\d.]+ ms \\([\\d.]+[kM]?\\) a frame\\.That is [\\d.]+ times as fast as the best refit \\([\\d.]+ to [\\d.]+ in \\d+ cells\\)\\. It beats the best refit \\([^)]+\\) in \\d+ of \\d+ cells`),
   );
   await press("10k to 100k");
   assert.match(await page.evaluate(() => location.hash), /know=next&large=medium/);
@@ -149,13 +162,80 @@ await check("three questions are answered by a name, an interval and a curve", a
   leave(page);
 });
 
-await check("what was not asked for is said", async () => {
-  const page = await open("reference");
-  const kinds = await page.evaluate(() => [...new Set(window.explorer.situations().map(({ asks }) => asks))]);
-  assert.ok(!kinds.includes("rays"));
-  assert.match(await page.$eval(".questions .note", (one) => one.textContent), /^Not measured in these results: [^.]*rays\. The report says what is known of them\.$/);
-  assert.equal(await page.$eval(".questions .note a", (one) => one.getAttribute("href")), "report.html");
+const pressed = (page) => page.$$eval('.segments [aria-pressed="true"]', (list) => list.map((one) => one.textContent));
+const press = (page, text) =>
+  page.evaluate((text) => [...document.querySelectorAll(".segments button")].find((one) => one.textContent === text).click(), text);
+
+/** Expects every dashed choice, and no other, to be named by the line below its question. */
+async function reasons(page) {
+  const groups = await page.$$eval(".question-of", (list) =>
+    list.map((one) => [[...one.querySelectorAll("button.unmeasured")].map((button) => button.textContent), one.querySelector(".reason")?.textContent ?? "", one.querySelectorAll(":disabled").length]),
+  );
+  assert.equal(groups.length, 4);
+  for (const [absent, said, disabled] of groups) {
+    assert.equal(disabled, 0, "every choice can be made");
+    assert.equal(said !== "", absent.length > 0, said);
+    for (const name of absent) assert.ok(said.includes(name), `${name}: ${said}`);
+  }
+  return groups.flatMap(([absent]) => absent);
+}
+
+await check("a choice that was not measured stays, is said, and is answered by the project's measurements or the nearest ones", async () => {
+  const page = await open("merged");
+  assert.deepEqual(await pressed(page), ["Nothing: positions only", "1", "Any size", "two bodies"]);
+  const absent = await reasons(page);
+  for (const name of ["2 to 9", "10k to 100k", "100k and more", "one body with itself, too", "rays with bodies"]) assert.ok(absent.includes(name), name);
+  const card = () => page.$eval(".answer", (one) => one.textContent);
+
+  await press(page, "10k to 100k"); // the project has it
+  assert.deepEqual(await pressed(page), ["Nothing: positions only", "1", "10k to 100k", "two bodies"]);
+  assert.match(await card(), /^Not measured in these results: two bodies, positions only \(a keyframe at every frame\), 10k to 100k triangles\. Nothing above 8k was\.Take /);
+  // What it takes is what the rule takes of these cells.
+  const rule = await page.evaluate(() => {
+    const { cells, strategies } = window.explorer.model.data.kept;
+    const own = cells.filter((one) => one.asks === "pairs of two bodies" && one.l < 2 && one.primitives >= 1e4 && one.primitives < 1e5);
+    const speed = (id) => {
+      const known = own.filter((one) => id in one.speeds).map((one) => one.speeds[id]);
+      if (2 * known.length < own.length || !["", "none"].includes(strategies[id][1])) return 0;
+      return [...known, ...Array(own.length - known.length).fill(Math.min(...known))].reduce((product, one) => product * one, 1);
+    };
+    const best = Object.keys(strategies).reduce((most, id) => (speed(id) > speed(most) ? id : most));
+    return [strategies[best][0], own.length];
+  });
+  assert.ok(rule[1] > 3);
+  assert.ok((await card()).includes(`Take ${rule[0]}: `), `${rule[0]}: ${await card()}`);
+  assert.match(await card(), /By the project's own measurements, not by these results\. .*Measured: plans? .*commit [0-9a-f]{8}, .*Nearest in these results: positions only \(a keyframe at every frame\), below 10k triangles\./);
+  await reasons(page);
+
+  await press(page, "one body with itself, too"); // the project has it for other frames only
+  assert.deepEqual(await pressed(page), ["Nothing: positions only", "1", "10k to 100k", "one body with itself, too"]);
+  assert.match(await card(), /^Not measured in these results: one body with itself, too, positions only/);
+  assert.match(await card(), /The project's own measurements have it with 10 frames a keyframe and more, 10k to 100k triangles\.$/);
+  assert.doesNotMatch(await card(), /Take /);
+  await reasons(page);
+  await page.click(".kept-near button"); // leads there
+  assert.deepEqual(await pressed(page), ["Nothing: positions only", "10 and more", "10k to 100k", "one body with itself, too"]);
+  assert.match(await card(), /^Not measured in these results: .*Take .*By the project's own measurements/);
+
+  await press(page, "100k and more"); // nobody has it
+  await press(page, "two bodies");
+  assert.match(await card(), /Nothing above 8k was\.Nearest in these results: .*take /);
+  await page.click(".nearest button"); // leads there
+  assert.match(await card(), /^Take /);
+  assert.deepEqual(await pressed(page), ["Nothing: positions only", "10 and more", "below 10k", "two bodies"]);
   leave(page);
+});
+
+await check("results without the measurements of the project say what they lack", async () => {
+  const page = await load("merged");
+  const said = await page.evaluate(() => {
+    window.explorer.model.data.kept = null;
+    window.explorer.set({ asks: "rays" });
+    return document.querySelector(".answer").textContent;
+  });
+  assert.equal(said, "Not measured in these results: rays with bodies, positions only (a keyframe at every frame).Nothing near it was measured, either.");
+  await reasons(page);
+  await page.close();
 });
 
 await check("a range of few rounds is not called an interval", async () => {

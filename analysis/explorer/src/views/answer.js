@@ -1,50 +1,59 @@
-// Three questions, and what the results answer: a name, an interval and a curve.
-import { FRAMES, KNOWN, PAIRS, SIZES, classOf, countedCells, ranked } from "../advice.js";
+// Four questions, and what the results answer: a name, an interval and a curve.
+import { ASKS, FRAMES, KNOWN, PAIRS, SIZES, classOf, countedCells, matches, nearest, ranked } from "../advice.js";
 import { tableOf } from "../chart.js";
 import { choice, make, symbol } from "../dom.js";
 import { SIX, compare, ratioText, value } from "../model.js";
 import { span } from "../statistics.js";
 import { factor, milliseconds, plural } from "../words.js";
 import { sweepFigure, sweeps } from "./scaling.js";
+import { keptCosts, unmeasured } from "./unmeasured.js";
 
-/** Returns the answers to the questions: those of the state, or else the first that have cells. */
+/**
+ * Returns what is asked: the choices of the state, or else the first that the results answer. A choice that was not measured stays the
+ * choice: `cells` is empty then, `kept` has the cells that come with the project, and `near` the nearest ones of these results.
+ */
 export function asked(model, state) {
   const every = countedCells(model);
-  const kinds = [...new Set(every.map(({ cell }) => cell.asks))].sort((a, b) => (b === PAIRS) - (a === PAIRS));
-  const asks = kinds.includes(state.asks) ? state.asks : kinds[0];
+  const here = new Set(every.map(({ cell }) => cell.asks));
+  const kinds = [...new Set([...Object.keys(ASKS), ...here])];
+  const asks = kinds.includes(state.asks) ? state.asks : here.has(PAIRS) || !here.size ? PAIRS : [...here][0];
   const scenes = [...new Set(every.filter(({ cell }) => cell.asks === asks).map(({ cell }) => cell.scene))];
   const scene = scenes.includes(state.of) ? state.of : "";
-  const sized = every.filter(({ cell }) => cell.asks === asks && (!scene || cell.scene === scene));
-  const sizes = new Set(sized.map(({ cell }) => classOf(SIZES, cell.primitives)));
-  const size = sizes.has(state.large) ? state.large : "any";
-  const matching = sized.filter(({ cell }) => size === "any" || classOf(SIZES, cell.primitives) === size);
-  const counts = Object.fromEntries(
-    Object.keys(FRAMES).map((key) => [key, matching.filter(({ cell }) => classOf(FRAMES, cell.l) === key).length]),
-  );
+  const own = every.filter(({ cell }) => cell.asks === asks && (!scene || cell.scene === scene));
+  const known = (model.data.kept?.cells ?? []).filter((cell) => cell.asks === asks);
+  const size = state.large in SIZES ? state.large : "any";
+  const matching = own.filter(({ cell }) => matches(cell, size));
   // Positions that arrive frame by frame are keyframes; motion that is known has frames between its keyframes.
-  const classes = Object.keys(FRAMES).filter((key) => counts[key]);
-  const frames = counts[state.frames] ? state.frames : state.know === "none" ? classes[0] : classes.at(-1);
-  return {
-    ...{ kinds, asks, scenes, scene, sizes, size, counts, frames, matching },
-    cells: matching.filter(({ cell }) => classOf(FRAMES, cell.l) === frames),
-  };
+  const usual = Object.keys(FRAMES).filter((key) => matching.some(({ cell }) => matches(cell, "", key)));
+  const frames = state.frames in FRAMES ? state.frames : state.know === "none" ? "1" : (usual.at(-1) ?? "10");
+  const cells = matching.filter(({ cell }) => matches(cell, "", frames));
+  const kept = cells.length || scene ? [] : known.filter((cell) => matches(cell, size, frames));
+  const near = cells.length ? null : nearest(own, size, frames);
+  return { every, here, kinds, asks, scenes, scene, own, known, size, matching, frames, cells, kept, near };
 }
 
 export function answer(context) {
   const { model, state } = context;
   const found = asked(model, state);
-  if (!found.cells.length)
+  if (!found.every.length && !model.data.kept)
     return [make("p", { class: "lead", text: "These results have no scene with a refit and another strategy: nothing can be compared." })];
-  const order = ranked(model, found.cells, state.know);
+  const ask = (card) => make("div", { class: "ask" }, questions(context, found), card);
+  if (found.cells.length) {
+    const order = ranked(model, found.cells, state.know);
+    return [ask(said(context, found, order)), curve(context, found, order), cost(context, found, order[0])].filter(Boolean);
+  }
+  const order = found.near ? ranked(model, found.near.cells, state.know) : [];
+  const near = found.near && { ...found, ...found.near, matching: found.own.filter(({ cell }) => matches(cell, found.near.size)) };
   return [
-    make("div", { class: "ask" }, questions(context, found), said(context, found, order)),
-    curve(context, found, order),
-    cost(context, found, order[0]),
+    ask(unmeasured(context, found, order[0])),
+    keptCosts(context, found),
+    order.length > 0 && curve(context, near, order),
+    order.length > 0 && cost(context, near, order[0]),
   ].filter(Boolean);
 }
 
-/** A question with a few answers: buttons, of which one is pressed. */
-function buttons(question, options, chosen, change, absent = () => false) {
+/** A question with a few answers: buttons, of which one is pressed; those that were not measured are dashed, and a line says so. */
+function buttons(question, options, chosen, change, absent, reason) {
   return make(
     "fieldset",
     { class: "question-of" },
@@ -55,43 +64,70 @@ function buttons(question, options, chosen, change, absent = () => false) {
       Object.entries(options).map(([key, name]) =>
         make("button", {
           type: "button",
+          class: absent?.(key) ? "unmeasured" : null,
           text: name,
           "aria-pressed": String(key === chosen),
-          disabled: absent(key),
-          title: absent(key) ? "not measured in these results" : null,
           click: () => change(key),
         }),
       ),
     ),
+    reason && make("p", { class: "note reason", text: reason }),
   );
 }
 
 const names = (classes) => Object.fromEntries(Object.entries(classes).map(([key, one]) => [key, one.name]));
 
-/** Questions that users have, by their names as `found.kinds` has them. */
-const COMMON = ["pairs within a body, too", "rays"];
+/** Says which options were not measured in these results, and of which the project has measurements; "" if all were. */
+function reasonOf(options, absent, isKept, more = "") {
+  const without = Object.keys(options).filter(absent);
+  if (!without.length) return "";
+  const [kept, open] = [without.filter(isKept), without.filter((key) => !isKept(key))].map((keys) => keys.map((key) => options[key]).join(", "));
+  return [
+    kept && `Not measured in these results, answered by the project's own measurements: ${kept}.`,
+    open && `${kept ? "Measured in neither" : "Not measured in these results"}: ${open}.`,
+    more,
+  ]
+    .filter(Boolean)
+    .join(" ");
+}
 
 function questions({ model, state, set }, found) {
-  const absent = COMMON.filter((kind) => !found.kinds.includes(kind));
-  const kinds = Object.fromEntries(found.kinds.map((kind) => [kind, kind]));
+  const kinds = Object.fromEntries(found.kinds.map((kind) => [kind, ASKS[kind] ?? kind]));
   const scenes = { "": "any scene", ...Object.fromEntries(found.scenes.map((scene) => [scene, scene])) };
+  const known = found.scene ? [] : found.known;
+  const question = (text, options, chosen, name, absent, isKept, more) =>
+    buttons(text, options, chosen, (key) => set({ [name]: key }), absent, reasonOf(options, absent, isKept, more));
+  const largest = found.own.map(({ cell }) => cell).reduce((most, cell) => (most && most.primitives >= cell.primitives ? most : cell), null);
   return make(
     "section",
     { class: "questions", "aria-label": "Questions" },
     buttons("1. What do you know of the future?", names(KNOWN), state.know, (know) => set({ know })),
-    buttons("2. Frames a keyframe? (Positions only: 1)", names(FRAMES), found.frames, (frames) => set({ frames }), (key) => !found.counts[key]),
-    make(
-      "div",
-      {},
-      buttons("3. How large, and whole or with itself?", names(SIZES), found.size, (large) => set({ large }), (key) => key !== "any" && !found.sizes.has(key)),
-      make(
-        "div",
-        { class: "toolbar" },
-        choice("asked for", kinds, found.asks, (asks) => set({ asks })),
-        choice("scene", scenes, found.scene, (of) => set({ of })),
-      ),
-      absent.length > 0 && make("p", { class: "note" }, `Not measured in these results: ${absent.join(", ")}.`, model.data.report && [" ", make("a", { href: model.data.report, text: "The report" }), " says what is known of them."]),
+    question(
+      "2. How many frames from one keyframe to the next? (Positions only: 1)",
+      names(FRAMES),
+      found.frames,
+      "frames",
+      (key) => !found.matching.some(({ cell }) => matches(cell, "", key)),
+      (key) => known.some((cell) => matches(cell, found.size, key)),
     ),
+    question(
+      "3. How many triangles?",
+      names(SIZES),
+      found.size,
+      "large",
+      (key) => key !== "any" && !found.own.some(({ cell }) => matches(cell, key)),
+      (key) => known.some((cell) => matches(cell, key)),
+      largest && `The largest scene here has ${largest.size}.`,
+    ),
+    question(
+      "4. What collides?",
+      kinds,
+      found.asks,
+      "asks",
+      (key) => !found.here.has(key),
+      (key) => (model.data.kept?.cells ?? []).some((cell) => cell.asks === key),
+    ),
+    make("div", { class: "toolbar" }, choice("scene", scenes, found.scene, (of) => set({ of }))),
   );
 }
 
@@ -114,6 +150,18 @@ export function speedText(one) {
   return `${factor(one.speed)} times as fast as the best refit (${of}${missing}${one.disturbed ? "; the machine was disturbed" : ""})`;
 }
 
+/** Tells on how many cells a strategy beats the best refit, which refit that is, and where it loses; "" of one cell or of a best refit. */
+export function winsText(one) {
+  if (one.cells < 2 || one.contestant.baseline) return "";
+  const refits = Map.groupBy(one.own, ({ refit }) => refit.contestant.title);
+  const [title, most] = [...refits].sort((a, b) => b[1].length - a[1].length)[0];
+  const lost = one.own.filter(({ speeds }) => speeds.get(one.id) < 1);
+  const scenes = [...new Set(lost.map(({ cell }) => cell.scene))];
+  const where = scenes.length && `; slower on ${scenes.slice(0, 3).join(", ")}${scenes.length > 3 ? ` and ${scenes.length - 3} more` : ""}`;
+  const of = refits.size === 1 ? title : `${title} in ${most.length} of them`;
+  return `It beats the best refit (${of}) in ${one.own.length - lost.length} of ${plural(one.own.length, "cell")}${where || ""}.`;
+}
+
 /** What a guarantee promises of the answers. */
 const PROMISES = { exact: "its answers are exact", candidate_superset: "it misses nothing, and may report some pairs too many" };
 
@@ -125,9 +173,14 @@ export function costText(model, one) {
     const [at, from, to] = [middle, low, high].map(milliseconds);
     return from === to ? `${at} ms a frame` : `${at} ms a frame (${isInterval ? "95\u00a0% interval" : "range of its rounds"} ${from} to ${to})`;
   }
-  const times = runs.map((run) => value(model, run, "with_motion"));
-  const [low, high] = [Math.min(...times), Math.max(...times)].map(milliseconds);
-  return `${low === high ? low : `${low} to ${high}`} ms a frame`;
+  return rangeText(one.own.map(({ cell }, i) => [value(model, runs[i], "with_motion"), cell]));
+}
+
+/** Tells times in ms of several cells from the shortest to the longest, each with the size of its scene. */
+export function rangeText(times) {
+  const [low, high] = [-1, 1].map((sign) => times.reduce((most, one) => (sign * (one[0] - most[0]) > 0 ? one : most)));
+  const text = ([time, cell]) => `${milliseconds(time)} ms (${cell.size})`;
+  return `${text(low)}${low === high ? "" : ` to ${text(high)}`} a frame`;
 }
 
 function said({ model, state, set }, found, order) {
@@ -147,7 +200,7 @@ function said({ model, state, set }, found, order) {
     "section",
     { class: "answer", "aria-live": "polite" },
     make("p", { class: "take" }, "Take ", symbol(best.contestant), make("strong", { text: best.contestant.title }), `: ${costText(model, best)}.`),
-    make("p", { class: "speed", text: `That is ${speedText(best)}.` }),
+    make("p", { class: "speed", text: [`That is ${speedText(best)}.`, winsText(best)].filter(Boolean).join(" ") }),
     make(
       "p",
       {},

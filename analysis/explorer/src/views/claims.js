@@ -24,35 +24,44 @@ export function claims({ model }) {
     ),
     make("p", {
       class: "note",
-      text: `${plural(decided.length, "claim")} of Zachmann and Weller (2006), theory (T) and experiments (E), judged by thresholds in analysis/claims.json: by these results where they decide, else by the reference run that comes with the project${reference ? ` (${reference})` : ""}.`,
+      text: `${plural(decided.length, "claim")} of Zachmann and Weller (2006), experiments (E), then theory (T), judged by thresholds in analysis/claims.json: by these results where they decide, else by the reference run that comes with the project${reference ? ` (${reference})` : ""}.`,
     }),
     ...decided.map((one) => {
       const picture = make("div", { class: "drawn" });
       picture.innerHTML = one.picture; // made by analysis/claims/claim_pictures.py
+      const verdict = (text) => make("span", { class: `verdict ${text.replaceAll(" ", "-")}`, text });
       return make(
-        "article",
+        "details",
         { class: "claim", id: `claim-${one.id}` },
         make(
-          "div",
+          "summary",
           {},
-          make("h3", {}, make("span", { class: "id", text: one.id }), " ", one.claim),
-          one.paper &&
-            make("p", { class: "note", text: `${one.id.startsWith("T") ? "Bound" : "Paper"}: ${one.paper}` }),
-          make(
-            "p",
-            {},
-            make("span", { class: `verdict ${one.verdict.replaceAll(" ", "-")}`, text: one.verdict }),
-            one.source === HERE ? " " : make("span", { class: "note", text: " by the reference run " }),
-            one.brief,
-          ),
-          report &&
-            make(
-              "p",
-              { class: "note" },
-              make("a", { href: `${report}#claim-${one.id}`, text: "corners and conditions in the report" }),
-            ),
+          make("span", { class: "id", text: one.id }),
+          verdict(one.verdict),
+          one.claim,
+          one.source !== HERE && make("span", { class: "note", text: " (by the reference run)" }),
         ),
-        one.picture && picture,
+        make(
+          "div",
+          { class: "inside" },
+          make(
+            "div",
+            {},
+            one.paper && make("p", { class: "note", text: `${one.id.startsWith("T") ? "Bound" : "Paper"}: ${one.paper}` }),
+            one.corners?.length > 0 && [
+              make("p", { class: "note", text: "Measured factors, without motion evaluation, of each pair that is compared:" }),
+              make(
+                "ul",
+                { class: "corners" },
+                one.corners.map(([name, span, own]) => make("li", {}, verdict(own), ` ${name}: `, make("strong", { text: span }))),
+              ),
+            ],
+            // The ranges above say which structures the extremes of the sentence belong to.
+            make("p", { text: one.corners?.length ? one.brief.replace(/Measured: .*; claimed: /, "Claimed: ") : one.brief }),
+            report && make("p", { class: "note" }, make("a", { href: `${report}#claim-${one.id}`, text: "corners and conditions in the report" })),
+          ),
+          one.picture && picture,
+        ),
       );
     }),
   ];

@@ -1,0 +1,69 @@
+// What the page says to a choice that the results have no measurements of: that they have none, what the project has measured, what is near.
+import { ASKS, FRAMES, KNOWN, SIZES, nearest, rankedKept } from "../advice.js";
+import { tableOf } from "../chart.js";
+import { make } from "../dom.js";
+import { factor, milliseconds, plural, sentence } from "../words.js";
+import { costText, rangeText, speedText } from "./answer.js";
+
+/** Names classes of l and of sizes. */
+function situation(frames, size) {
+  const words = frames === "1" ? "positions only (a keyframe at every frame)" : FRAMES[frames].words;
+  return size === "any" ? words : `${words}, ${SIZES[size].name} triangles`;
+}
+
+/** The answer card of a choice without measurements; `best` is what the rule takes in the nearest cells of these results. */
+export function unmeasured({ model, state, set }, found, best) {
+  const { kept } = model.data;
+  const own = found.kept.length ? rankedKept(kept, found.kept, state.know)[0] : null;
+  const largest = found.own.map(({ cell }) => cell).reduce((most, cell) => (most && most.primitives >= cell.primitives ? most : cell), null);
+  const above = largest && found.size !== "any" && SIZES[found.size].from > largest.primitives ? ` Nothing above ${largest.size} was.` : "";
+  const known = !own && !found.scene ? nearest(found.known.map((cell) => ({ cell })), found.size, found.frames) : null;
+  const other = known && !(best && known.frames === found.near.frames && known.size === found.near.size) ? known : null;
+  const lead = ({ frames, size }) =>
+    make("button", { type: "button", class: "quiet", text: situation(frames, size), click: () => set({ frames, large: size }) });
+  const scene = found.scene ? `${found.scene}, ` : "";
+  return make(
+    "section",
+    { class: "answer", "aria-live": "polite" },
+    make("p", { class: "absent-here" }, make("strong", { text: "Not measured in these results: " }), `${ASKS[found.asks] ?? found.asks}, ${scene}${situation(found.frames, found.size)}.${above}`),
+    own && [
+      make("p", { class: "take" }, "Take ", make("strong", { text: own.contestant.title }), `: ${rangeText(own.own.map((cell) => [cell.times[own.id], cell]))}.`),
+      make("p", { class: "speed", text: `That is ${speedText(own)}.` }),
+      make("p", {}, "By the project's own measurements, not by these results. It is called ", make("code", { text: own.id }), " on the command line and in code."),
+      make("p", { class: "note", text: `Measured: ${kept.told}.` }),
+    ],
+    best &&
+      make(
+        "p",
+        { class: own ? "note nearest" : "nearest" },
+        "Nearest in these results: ",
+        lead(found.near),
+        `. There, where ${KNOWN[state.know].words}, take ${best.contestant.title}: ${costText(model, best)}${best.cells === 1 ? ` on ${best.own[0].cell.title}` : ""}; ${speedText(best)}.`,
+      ),
+    other && make("p", { class: "kept-near" }, "The project's own measurements have it with ", lead(other), "."),
+    !own && !best && !other && make("p", { text: "Nothing near it was measured, either." }),
+  );
+}
+
+/** What the project's choice costs in each cell that comes with the project. */
+export function keptCosts({ model, state }, found) {
+  if (!found.kept.length) return null;
+  const { kept } = model.data;
+  const best = rankedKept(kept, found.kept, state.know)[0];
+  if (!best) return null;
+  const ms = (cell, id) => (id in cell.times ? milliseconds(cell.times[id]) : "–");
+  const rows = found.kept.map((cell) => [
+    cell.title,
+    ms(cell, best.id),
+    kept.strategies[cell.refit]?.[0] ?? cell.refit,
+    ms(cell, cell.refit),
+    best.id === cell.refit ? "the best refit" : best.id in cell.speeds ? factor(cell.speeds[best.id]) : "–",
+  ]);
+  return make(
+    "section",
+    {},
+    make("h2", { text: "What it costs in the project's own measurements" }),
+    make("p", { class: "note", text: sentence(`${plural(rows.length, "cell")}: a cell is one scene at one size, with l frames from a keyframe to the next.`) }),
+    make("div", { class: "scroll", tabindex: 0 }, tableOf(["scene", `${best.contestant.title}, ms`, "best refit", "ms", "times as fast"], rows)),
+  );
+}
