@@ -56,7 +56,7 @@ class TestRule(unittest.TestCase):
     def test_losing_cells_are_counted_and_the_worst_is_named(self) -> None:
         lines = [line("refit", 2.0, "cloth"), line("refit", 2.0, "ball"), other("join", 0.5, "cloth"), other("join", 4.0, "ball")]
         best = taken(lines)[0]
-        self.assertIn("(faster in 1 of 2 scenes, 0.50 to 4.00, slowest on ball, 4k, l = 10)", best.says)
+        self.assertIn("(faster in 1 of 2 scenes, 0.50 to 4.00, slowest on ball-3600-400, 4k, l = 10)", best.says)
 
     def test_cells_of_one_scene_are_not_called_scenes(self) -> None:
         facts = {"refit": advice.Facts("refit", "none", True), "join": advice.Facts("join", "none", False)}
