@@ -110,8 +110,8 @@ def _ranges(corners: Sequence[dict[str, Any]], ours: dict[str, str]) -> list[tup
 
 #: The corners that the question of MAIN is answered in: the refit, the tree, and how a condition names both.
 ASKED = (
-    ("best:2006", "Against a refit as in 2006", "at its best", "at its best against that refit"),
-    ("2006:2006", "Against a refit as in 2006", "as in 2006", "as in 2006 against that refit"),
+    ("best:2006", "Against a refit as in 2006", "at its best", "at its best against the refit of 2006"),
+    ("2006:2006", "Against a refit as in 2006", "as in 2006", "as in 2006 against the refit of 2006"),
     ("best:best", "Against today's best refit", "", "at its best against today's best refit"),
 )
 

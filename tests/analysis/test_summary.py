@@ -66,7 +66,7 @@ class TestPaper(unittest.TestCase):
             summary.parts_on_the_paper(self.paper(row("E3", claims.OPEN)))[0],
             "Is updating a kinetic AABB tree faster than a bottom-up refit? Against a refit as in 2006: yes at its best (1.04 to 40.1 times as fast), "
             "not always as in 2006 (0.037 to 3.35 times as fast). Against today's best refit: no (0.0081 to 0.66 times as fast). Claim E3 (E3) holds "
-            "with a condition: at its best against that refit met from 3 frames a keyframe on; as in 2006 against that refit met nowhere; at its best "
+            "with a condition: at its best against the refit of 2006 met from 3 frames a keyframe on; as in 2006 against the refit of 2006 met nowhere; at its best "
             "against today's best refit met at 2 of 3 points (the reference run).",
         )
 
