@@ -39,6 +39,13 @@ FRAMES: dict[str, tuple[float, float]] = {
     "10 frames a keyframe and more": (10, math.inf),
 }
 
+#: Classes of sizes in primitives, each with its first and the first beyond it: those of the explorer.
+SIZES: dict[str, tuple[float, float]] = {
+    "below 10k": (0, 1e4),
+    "10k to 100k": (1e4, 1e5),
+    "100k and more": (1e5, math.inf),
+}
+
 #: What is asked of a cell (`asked`), in the order of pages.
 PAIRS, SELF, RAYS = "pairs of two bodies", "pairs within a body, too", "rays"
 
@@ -64,6 +71,11 @@ def frames_of(l: float) -> str:
     return next(name for name, (low, high) in FRAMES.items() if low <= l < high)
 
 
+def said_of(frames: str) -> str:
+    """Writes a class of FRAMES as those say it who have positions and no keyframes."""
+    return f"positions only ({frames})" if frames == next(iter(FRAMES)) else frames
+
+
 @dataclass(frozen=True)
 class Facts:
     """What the rule has to know of a strategy."""
@@ -84,6 +96,7 @@ class Cell:
     title: str
     asks: str
     frames: str
+    primitives: float
     best_refit: str  #: the strategy whose fastest setting is the best refit
     speeds: dict[str, float]  #: by strategy: times as fast as the best refit
     times: dict[str, float]  #: by strategy: ms per frame of the whole clip, positions included
@@ -128,32 +141,43 @@ class Advice:
     disturbed: bool = False
     is_interval: bool = False  #: in a single cell: of at least five rounds
     times: tuple[float, float] = (math.nan, math.nan)  #: ms per frame in the cell with the shortest, and the longest
+    sizes: tuple[float, float] = (math.nan, math.nan)  #: primitives of these two cells
+    word: str = "cell"  #: for one of the situation's cells: "scene" where no two are of one scene
+    faster: int = 0  #: cells in which it is faster than the best refit
+    refit: str = "the best refit"  #: what it is compared with: one refit's title if that is the best one in all cells
 
     @property
     def says(self) -> str:
-        """Writes the speed out, as in "1.6 times as fast as the best refit (0.9 to 2.1 in 8 cells)"."""
+        """Writes the speed out, as in "1.6 times as fast as the best refit (faster in 7 of 8 scenes, slowest on ball, 2k, l = 10: 0.9 to 2.1)"."""
         missing = f", measured in {self.measured}" if self.measured < self.cells else ""
         disturbed = " (the machine was disturbed)" if self.disturbed else ""
         if self.baseline and not self.best_in:
             span = text.factor(self.low) + (f" to {text.factor(self.high)}" if self.low < self.high else "")
-            return f"a refit, {span} times as fast as the best one of the {'cell' if self.cells == 1 else 'cells'}{missing}{disturbed}"
+            return f"a refit, {span} times as fast as the best one of the {self.word if self.cells == 1 else self.word + 's'}{missing}{disturbed}"
         if self.baseline:
-            where = "in the only cell" if self.cells == 1 else f"in {self.best_in} of {text.plural(self.cells, 'cell')}"
+            where = f"in the only {self.word}" if self.cells == 1 else f"in {self.best_in} of {text.plural(self.cells, self.word)}"
             behind = "less than 1\u00a0% slower" if text.factor(self.low) == "1.00" else f"at worst {text.factor(self.low)} times as fast"
             worst = f"; elsewhere {behind}" if self.best_in < self.cells else ""
             return f"the best refit {where}{worst}{missing}{disturbed}"
         span = f"{text.factor(self.low)} to {text.factor(self.high)}" if self.low < self.high else ""
-        of = f"{span} in {text.plural(self.cells, 'cell')}".lstrip()
+        of = f"in {text.plural(self.cells, self.word)}"
         if span and self.cells == 1:
             of = ("95\u00a0% interval " if self.is_interval else "range of its rounds ") + span
+        elif span:
+            of = f"faster in {self.faster} of {text.plural(self.measured, self.word)}, {span}"
+            of += f", slowest on {self.worst}" if self.faster < self.measured else ""
         doubt = "; the machine was disturbed" if self.disturbed else ""
-        return f"{text.factor(self.speed)} times as fast as the best refit ({of}{missing}{doubt})"
+        mean = " on average" if self.cells > 1 else ""
+        return f"{text.factor(self.speed)} times as fast as {self.refit}{mean} ({of}{missing}{doubt})"
 
     @property
     def costs(self) -> str:
-        """Writes the times out, as in "0.12 to 0.64 ms a frame"."""
+        """Writes the times out with the sizes that they were measured at, as in "0.12 ms (2k) to 0.64 ms (9k primitives) a frame"."""
         low, high = (text.milliseconds(one) for one in self.times)
-        return f"{low} ms a frame" if low == high else f"{low} to {high} ms a frame"
+        small, large = (text.size(one) for one in self.sizes)
+        if low == high and small == large:
+            return f"{low} ms a frame ({small} primitives)"
+        return f"{low} ms ({small}) to {high} ms ({large} primitives) a frame"
 
 
 @dataclass
@@ -164,6 +188,7 @@ class Situation:
     frames: str
     cells: int
     advice: list[tuple[str, Optional[Advice]]]  #: in the order of FORESIGHT
+    sizes: tuple[float, float] = (math.nan, math.nan)  #: primitives of the smallest and the largest cell
 
 
 @dataclass
@@ -193,7 +218,7 @@ def cells(study: Study) -> list[MeasuredCell]:
         runs = dict(zip(map(str, best["id"]), map(int, best["run"])))
         found.append(
             MeasuredCell(
-                title=_title(row), asks=asked(row), frames=frames_of(float(row["l"])), refit=refit, runs=runs, row=row,
+                title=_title(row), asks=asked(row), frames=frames_of(float(row["l"])), primitives=float(row["primitives"]), refit=refit, runs=runs, row=row,
                 best_refit=next((id for id, run in runs.items() if run == refit), ""), contestants=dict(zip(best["id"], best["contestant"])),
                 speeds={id: _speed(study, run, refit) for id, run in runs.items()}, times=dict(zip(map(str, best["id"]), map(float, best["total_motion"]))),
                 doubtful=frozenset(id for id, run in runs.items() if ratios.is_disturbed(study, run, refit)), facts=facts,
@@ -229,7 +254,8 @@ def situations(every: Sequence[Cell]) -> list[Situation]:
         for frames in FRAMES:
             own = [cell for cell in every if (cell.asks, cell.frames) == (asks, frames)]
             if own:
-                found.append(Situation(asks, frames, len(own), [(known, advise(own, known)) for known in FORESIGHT]))
+                sizes = [cell.primitives for cell in own]
+                found.append(Situation(asks, frames, len(own), [(known, advise(own, known)) for known in FORESIGHT], (min(sizes), max(sizes))))
     return found
 
 
@@ -257,11 +283,18 @@ def advise(own: Sequence[Cell], known: str) -> Optional[Advice]:
     is_interval = False
     if len(own) == 1:
         low, high, is_interval = own[0].span(best) or (low, high, False)
-    times = [cell.times[best] for cell in measured]
+    by_time = sorted(measured, key=lambda cell: (cell.times[best], cell.primitives))
+    ends = by_time[0], by_time[-1]
     facts = measured[0].facts[best]
+    refits = {cell.best_refit for cell in measured}
+    one_refit = next(iter(refits)) if len(refits) == 1 else ""
+    scenes = {cell.title.split(", ")[0] for cell in own}
     return Advice(
         best, facts.title, facts.baseline, most, low, high, len(own), len(measured), worst.title,
-        sum(cell.best_refit == best for cell in measured), any(best in cell.doubtful for cell in measured), is_interval, (min(times), max(times)),
+        sum(cell.best_refit == best for cell in measured), any(best in cell.doubtful for cell in measured), is_interval,
+        times=(ends[0].times[best], ends[1].times[best]), sizes=(ends[0].primitives, ends[1].primitives),
+        word="scene" if len(scenes) == len(own) else "cell", faster=sum(cell.speeds[best] > 1 for cell in measured),
+        refit=f"the {measured[0].facts[one_refit].title}" if one_refit in measured[0].facts else "the best refit",
     )  # fmt: skip
 
 
@@ -304,4 +337,16 @@ def sentence(one: Situation) -> str:
             parts.append(f"{best.title} {'if' if parts else 'where'} {known}: {best.says}, at {best.costs}")
             last = best.id
     asks = {PAIRS: "", SELF: " and pairs within a body"}.get(one.asks, f" and {one.asks}")
-    return f"With {one.frames}{asks}, take {'; '.join(parts)}." if parts else f"With {one.frames}{asks}, no strategy was measured in half of the cells."
+    begin = f"With {said_of(one.frames)}{asks}"
+    return f"{begin}, take {'; '.join(parts)}." if parts else f"{begin}, no strategy was measured in half of the cells."
+
+
+def brief(one: Situation) -> str:
+    """Writes the advice of a situation shorter, for measurements that are quoted: titles and times."""
+    parts: list[str] = []
+    last = ""
+    for known, best in one.advice:
+        if best is not None and best.id != last:
+            parts.append(f"{best.title}{f' if {known}' if parts else ''}, {best.costs}")
+            last = best.id
+    return f"{said_of(one.frames)}: {'; '.join(parts)}"

@@ -40,6 +40,13 @@ class Cells:
             plans.setdefault(tuple(rest), []).append(f"`{plan}`")
         return "; ".join(f"plan{'s' * (len(names) > 1)} {text.listing(names)}, {days}, commit {commit}, {cpu}" for (days, commit, cpu), names in plans.items())
 
+    @property
+    def short(self) -> str:
+        """Says where and on which days, without plans and commits, as in "AMD EPYC, 2026-11-27 to 2026-11-28"."""
+        days = sorted(day for _, days, _, _ in self.measured for day in days.split(" to "))
+        span = " to ".join(dict.fromkeys([days[0], days[-1]])) if days else ""
+        return ", ".join([*dict.fromkeys(cpu for *_, cpu in self.measured if cpu), *([span] if span else [])])
+
 
 def of_study(study: Study) -> Cells:
     """Returns the cells of a study."""
@@ -64,7 +71,7 @@ def content(found: Cells) -> str:
     for cell in found.cells:
         alone = counts[cell.asks, cell.frames] == 1
         one = {
-            "title": cell.title, "asks": cell.asks, "frames": cell.frames, "best_refit": cell.best_refit, "doubtful": sorted(cell.doubtful),
+            "title": cell.title, "asks": cell.asks, "frames": cell.frames, "primitives": cell.primitives, "best_refit": cell.best_refit, "doubtful": sorted(cell.doubtful),
             "speeds": _short(cell.speeds), "times": _short(cell.times),
             "spans": {id: [_digits(span[0]), _digits(span[1]), span[2]] for id in sorted(cell.speeds) if alone and (span := cell.span(id))},
         }  # fmt: skip
@@ -99,14 +106,14 @@ def _cell(one: dict[str, Any], facts: dict[str, Facts]) -> Cell:
     speeds, times = one["speeds"], one["times"]
     if set(speeds) != set(times) or not set(speeds) <= set(facts) or one["frames"] not in advice.FRAMES:
         raise ValueError("speeds, times and strategies do not belong together, or the frames have no class")
-    return Cell(one["title"], one["asks"], one["frames"], one["best_refit"], speeds, times, frozenset(one["doubtful"]), facts, spans.get)
+    return Cell(one["title"], one["asks"], one["frames"], float(one["primitives"]), one["best_refit"], speeds, times, frozenset(one["doubtful"]), facts, spans.get)
 
 
 def markdown(found: Sequence[Situation]) -> str:
     """Returns the advice as a table of Markdown."""
     lines = ["| situation | cells | " + " | ".join(advice.FORESIGHT) + " |", "|---|---|" + "---|" * len(advice.FORESIGHT)]
     for one in found:
-        row = [f"{one.asks}, {one.frames}", str(one.cells)]
+        row = [f"{one.asks}, {advice.said_of(one.frames)}", str(one.cells)]
         last = ""
         for _, best in one.advice:
             row.append(text.MISSING if best is None else "the same" if best.id == last else f"{best.title} (`{best.id}`): {best.says}, at {best.costs}")

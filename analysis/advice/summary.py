@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -33,6 +34,8 @@ class Verdict:
     reference: str  #: the verdict of the reference run, "" if it has none
     reference_brief: str = ""
     reference_corners: list[tuple[str, str]] = field(default_factory=list)
+    reference_judged: list[dict[str, Any]] = field(default_factory=list)  #: the corners as claims.json has them
+    reference_ours: dict[str, str] = field(default_factory=dict)
 
     @property
     def source(self) -> str:
@@ -51,6 +54,14 @@ class Verdict:
     def corners(self) -> list[tuple[str, str]]:
         """Returns the corners of the claim's square, each with the range that was measured, without motion evaluation."""
         return _ranges([asdict(one) for one in self.row.corners], self.row.ours) if self.source == HERE else self.reference_corners
+
+    @property
+    def judged(self) -> list[tuple[str, str, str]]:
+        """Returns the id of each corner, the range that was measured without motion evaluation, and where it is met."""
+        known = self.source == BY_REFERENCE
+        corners = self.reference_judged if known else [asdict(one) for one in self.row.corners]
+        ours = self.reference_ours if known else self.row.ours
+        return [(one["id"], ours[one["id"]].split(",")[0], str(one.get("rule", ""))) for one in corners if one["id"] in ours]
 
     @property
     def differs(self) -> bool:
@@ -89,7 +100,7 @@ def paper(claims: Claims, folder: Path, reference: Path = REFERENCE) -> Paper:
     for row in claims.rows:
         one = known.get(row.id, {})
         corners = _ranges(one.get("corners", []), one.get("ours", {}))
-        verdicts.append(Verdict(row, one.get("verdict", ""), one.get("brief", ""), corners))
+        verdicts.append(Verdict(row, one.get("verdict", ""), one.get("brief", ""), corners, one.get("corners", []), one.get("ours", {})))
     return Paper(verdicts, about)
 
 
@@ -97,12 +108,52 @@ def _ranges(corners: Sequence[dict[str, Any]], ours: dict[str, str]) -> list[tup
     return [(one["name"], ours[one["id"]].split(",")[0]) for one in corners if one["id"] in ours]
 
 
+#: The corners that the question of MAIN is answered in: the refit, the tree, and how a condition names both.
+ASKED = (
+    ("best:2006", "Against a refit as in 2006", "at its best", "at its best against the refit of 2006"),
+    ("2006:2006", "Against a refit as in 2006", "as in 2006", "as in 2006 against the refit of 2006"),
+    ("best:best", "Against today's best refit", "", "at its best against today's best refit"),
+)
+
+
+def on_the_main_claim(one: Verdict) -> str:
+    """Answers whether the kinetic AABB tree is updated faster than a refit: yes, no or not always, by corner, then the condition."""
+    known = {id: (span, rule) for id, span, rule in one.judged}
+    answers: dict[str, list[str]] = {}
+    for id, refit, tree, _ in ASKED:
+        if id in known:
+            answers.setdefault(refit, []).append(f"{answer(known[id][0])}{f' {tree}' if tree else ''} ({known[id][0]} times as fast)")
+    by = "this study" if one.source == HERE else f"{one.source}"
+    claim = f"{one.row.claim} ({MAIN})"
+    if not answers:
+        return f"{claim} {one.verdict} ({by})."
+    said = ". ".join(f"{refit}: {', '.join(parts)}" for refit, parts in answers.items())
+    where = "; ".join(f"{name} {_plain(known[id][1])}" for id, _, _, name in ASKED if id in known and known[id][1])
+    return f"Is updating a kinetic AABB tree faster than a bottom-up refit? {said}. {claim} {one.verdict}{f': {where}' if where else ''} ({by})."
+
+
+def answer(span: str) -> str:
+    """Returns whether all ratios of a range are above 1: yes, no, or not always."""
+    ends = [float(end.replace("\u202f", "")) for end in span.split(" to ")]
+    return "yes" if ends[0] > 1 else "no" if ends[-1] <= 1 else "not always"
+
+
+def _plain(rule: str) -> str:
+    """Writes a rule without its list of points, and l in words."""
+    return re.sub(r"l = ([\d.]+)", r"\1 frames a keyframe", re.sub(r" \([^()]*\)", "", rule))
+
+
 def on_the_paper(found: Paper) -> str:
     """Answers whether the paper holds: by this study where it decides, else by the reference run."""
+    return " ".join(parts_on_the_paper(found))
+
+
+def parts_on_the_paper(found: Paper) -> list[str]:
+    """Returns the answer on the paper's main claim, and the tally of all of them."""
     counts = {verdict: here + there for verdict, here, there in found.tally}
     decided = [one for one in found.verdicts if one.source]
     if not decided:
-        return "Does the paper hold? These results decide none of its claims, and no reference run comes with this program."
+        return ["Does the paper hold? These results decide none of its claims, and no reference run comes with this program."]
     parts = [f"{counts[HOLDS]} hold", f"{counts[CONDITION]} hold with a condition", f"{counts[FAILS]} do not hold"]
     parts += [f"{counts[OPEN]} are open"] if counts[OPEN] else []
     here = [one for one in decided if one.source == HERE]
@@ -114,11 +165,7 @@ def on_the_paper(found: Paper) -> str:
     if differ:
         says += f" The reference run judges {text.listing(differ)} otherwise."
     main = next((one for one in decided if one.row.id == MAIN), None)
-    if main is not None:
-        measured = "; ".join(f"{name}, {span}" for name, span in main.corners[:3])
-        says += f" {main.row.claim} ({MAIN}) {main.verdict} ({main.source})."
-        says += f" Times as fast: {measured}." if measured else ""
-    return says
+    return ([on_the_main_claim(main)] if main is not None else []) + [says]
 
 
 def on_disturbance(study: Study) -> str:
@@ -142,29 +189,70 @@ def on_disturbance(study: Study) -> str:
 
 @dataclass(frozen=True)
 class Sentence:
-    """One line of the top: its subject, the sentence, and the id of the part with the details."""
+    """One line of the top: its subject, its sentences, each a line of the page, and the id of the part with the details."""
 
     subject: str
-    says: str
+    parts: list[str]
     place: str
+
+    @property
+    def says(self) -> str:
+        """Returns the sentences as one text, for the terminal."""
+        return " ".join(self.parts)
+
+
+def kept_cells(reference: Path = REFERENCE) -> Optional[cells_file.Cells]:
+    """Returns the cells that come with the project; None without them."""
+    file = reference / cells_file.FILE
+    return cells_file.read(file) if file.exists() else None
+
+
+def on_larger(found: Sequence[Situation], reference: Path = REFERENCE) -> list[str]:
+    """Says up to which size a study measured pairs, and what the cells that come with the project have in the classes beyond it."""
+    pairs = [one for one in found if one.asks == advice.PAIRS]
+    largest = max((one.sizes[1] for one in pairs), default=math.nan)
+    classes = [name for name, (low, _) in advice.SIZES.items() if low > largest]
+    if not classes:
+        return []
+    kept = kept_cells(reference)
+    said, absent = [], []
+    for name in classes:
+        low, high = advice.SIZES[name]
+        own = [cell for cell in kept.cells if cell.asks == advice.PAIRS and low <= cell.primitives < high] if kept else []
+        every = advice.situations(own)
+        ends = [every[0], every[-1]] if len(every) > 1 else every
+        told = [f"with {advice.brief(one)}" for one in ends]
+        if told and kept:
+            said.append(f"By measurements that come with the project ({kept.short}), {name} primitives: {'. '.join(one[0].upper() + one[1:] for one in told)}.")
+        else:
+            absent.append(name)
+    first = f"This study has at most {text.size(largest)} primitives (triangles)."
+    none = [f"{text.listing(absent)} {'were' if len(absent) > 1 else 'was'} not measured."] if absent else []
+    return [" ".join([first, *said, *(one[0].upper() + one[1:] for one in none)])]
 
 
 def on_others(found: Sequence[Situation], reference: Path = REFERENCE) -> str:
     """Answers the questions other than pairs of two bodies: by this study, else by the cells that come with the project."""
+    return " ".join(parts_on_others(found, reference))
+
+
+def parts_on_others(found: Sequence[Situation], reference: Path = REFERENCE) -> list[str]:
+    """Returns the sentences of on_others."""
     others: dict[str, Situation] = {one.asks: one for one in found if one.asks != advice.PAIRS}  # the one with the most frames a keyframe
     named = [others[asks] for asks in dict.fromkeys([advice.SELF, advice.RAYS, *others]) if asks in others][:2]
-    words = [advice.sentence(one) for one in named]
+    said = [advice.sentence(one) for one in named]
     absent = [asks for asks in (advice.SELF, advice.RAYS) if asks not in others]
     if absent:
-        file = reference / cells_file.FILE
-        kept = cells_file.read(file) if file.exists() else None
+        kept = kept_cells(reference)
         known = {one.asks: one for one in advice.situations(kept.cells)} if kept else {}
-        names = {advice.SELF: "pairs within a body", advice.RAYS: "rays"}
-        words.append(f"{text.listing([names[asks] for asks in absent]).capitalize()} were not asked for in this study.")
+        names = {advice.SELF: "pairs within a body (self-collision)", advice.RAYS: "rays"}
+        begin = f"{text.listing([names[asks] for asks in absent])} were not asked for in this study."
+        begin = begin[0].upper() + begin[1:]
         told = [advice.sentence(known[asks]) for asks in absent if asks in known]
         if kept and told:
-            words.append(f"By measurements that come with the project ({kept.told.replace('`', '')}): {' '.join(told)}")
-    return " ".join(words)
+            begin += f" By measurements that come with the project ({kept.short}):"
+        said += [begin, *told]
+    return said
 
 
 def on_errors(errors: Sequence[time_error_panels.Shown], reference: Path = REFERENCE) -> str:
@@ -182,12 +270,12 @@ def sentences(study: Study, found: Sequence[Situation], errors: Sequence[time_er
     pairs = [one for one in found if one.asks == advice.PAIRS]
     said = []
     if pairs:
-        ends = [pairs[-1], pairs[0]] if len(pairs) > 1 else pairs
-        said.append(Sentence("What to take", " ".join(advice.sentence(one) for one in ends), "glance"))
-    said.append(Sentence("Other questions", on_others(found), "glance"))
-    said.append(Sentence("Time against error", on_errors(errors), "errors" if errors else "limits"))
-    said.append(Sentence("The paper", on_the_paper(known), "claims"))
-    said.append(Sentence("This run", on_disturbance(study), "limits"))
+        ends = [pairs[0], pairs[-1]] if len(pairs) > 1 else pairs
+        said.append(Sentence("What to take", [*(advice.sentence(one) for one in ends), *on_larger(found)], "glance"))
+    said.append(Sentence("Self-collision, rays", parts_on_others(found), "glance"))
+    said.append(Sentence("Time against error", [on_errors(errors)], "errors" if errors else "limits"))
+    said.append(Sentence("The paper", parts_on_the_paper(known), "claims"))
+    said.append(Sentence("This run", [on_disturbance(study)], "limits"))
     return said
 
 

@@ -29,6 +29,8 @@ from report import loop_part, sections, tables, targets_table
 from results import files, text
 from results.load import ONE_OF_EACH_COMMIT, ResultError, Study, load
 
+#: The heading of a report without a title of its own.
+TITLE = "Which BVH update to take?"
 TEMPLATES = Path(__file__).resolve().parent / "templates"
 
 
@@ -40,7 +42,7 @@ def main(arguments: Optional[list[str]] = None) -> int:
         epilog="example: report.py results --title 'My cloth'",
     )
     parser.add_argument("folder", metavar="RESULTS_DIR", type=Path, help="folder with results.jsonl")
-    parser.add_argument("--title", default=explore.TITLE, help="heading of the report")
+    parser.add_argument("--title", default=TITLE, help="heading of the report")
     parser.add_argument(
         "--figures", choices=("paper", "main", "all", "none"), default="paper",
         help="figures of the paper and its claims in the page (default); next to it also those of one group per scene (main) or of every "
@@ -65,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
         explorer, hint = "", f"{explore.PAGE} is not written: {reason}"
     made = write(study, options.folder, options.title, options.figures, targets, claims, explorer)
     if explorer:
-        title = "" if options.title == explore.TITLE else options.title  # else the plan's question
+        title = "" if options.title == TITLE else options.title  # else the plan's question
         explore.write(load(options.folder, ONE_OF_EACH_COMMIT), options.folder, title, claims)
     for note in [*study.notes, *([hint] if hint else [])]:  # last: a report that is not written needs no hint
         print(f"report: {note}", file=sys.stderr)
@@ -118,6 +120,8 @@ def write(
         chart=summary.chart(situations),
         lines=summary.lines(study, cells),
         anchors=anchors,
+        said_of=advice.said_of,
+        kept=kept.told.replace("`", "") if (kept := summary.kept_cells()) else "",
         foresight=list(advice.FORESIGHT),
         time_error=errors,
         time_error_slow=time_error.SLOW,

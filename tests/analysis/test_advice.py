@@ -51,7 +51,29 @@ class TestRule(unittest.TestCase):
         self.assertAlmostEqual(best.speed, math.sqrt(2 / 1.5 * 2 / 1.9))
         self.assertEqual((round(best.low, 3), round(best.high, 3)), (round(2 / 1.9, 3), round(2 / 1.5, 3)))
         self.assertTrue(best.worst.startswith("ball"), best.worst)
-        self.assertIn("in 2 cells", best.says)
+        self.assertEqual(best.says, "1.18 times as fast as the refit on average (faster in 2 of 2 scenes, 1.05 to 1.33)")
+
+    def test_losing_cells_are_counted_and_the_worst_is_named(self) -> None:
+        lines = [line("refit", 2.0, "cloth"), line("refit", 2.0, "ball"), other("join", 0.5, "cloth"), other("join", 4.0, "ball")]
+        best = taken(lines)[0]
+        self.assertIn("(faster in 1 of 2 scenes, 0.50 to 4.00, slowest on ball-3600-400, 4k, l = 10)", best.says)
+
+    def test_cells_of_one_scene_are_not_called_scenes(self) -> None:
+        facts = {"refit": advice.Facts("refit", "none", True), "join": advice.Facts("join", "none", False)}
+        own = [
+            advice.Cell(title, advice.PAIRS, next(iter(advice.FRAMES)), 2000, "refit", {"refit": 1.0, "join": 2.0}, {"refit": 2.0, "join": 1.0},
+                        frozenset(), facts, lambda id: None)
+            for title in ("cloth, 2k, l = 1", "cloth, 9k, l = 1", "ball, 2k, l = 1")
+        ]  # fmt: skip
+        words = [found.word for count in (2, 3) if (found := advice.advise(own[-count:], "nothing is known"))]
+        self.assertEqual(words, ["scene", "cell"])
+
+    def test_times_name_the_sizes_that_they_were_measured_at(self) -> None:
+        best = advice.Advice("a", "a", False, 2, 1, 3, 2, 2, "", 0, times=(0.5, 2.0), sizes=(2000, 16200))
+        self.assertEqual(best.costs, "0.500 ms (2k) to 2.00 ms (16k primitives) a frame")
+
+    def test_positions_without_keyframes_are_the_first_class(self) -> None:
+        self.assertEqual([advice.said_of(one) for one in advice.FRAMES][:2], ["positions only (a keyframe at every frame)", "2 to 9 frames a keyframe"])
 
     def test_a_missing_cell_counts_as_the_slowest(self) -> None:
         cloths = [f"cloth {i}" for i in range(4)]
@@ -75,10 +97,10 @@ class TestRule(unittest.TestCase):
             one["strategy"].update(baseline=True)
         best = taken(lines)[0]
         self.assertEqual(best.id, "lazy")
-        self.assertEqual(best.says, "the best refit in 1 of 3 cells; elsewhere at worst 0.91 times as fast")
+        self.assertEqual(best.says, "the best refit in 1 of 3 scenes; elsewhere at worst 0.91 times as fast")
         for one in lines[3:5]:
             one["times"] = line("lazy", 1.004)["times"]
-        self.assertEqual(taken(lines)[0].says, "the best refit in 1 of 3 cells; elsewhere less than 1\u00a0% slower")
+        self.assertEqual(taken(lines)[0].says, "the best refit in 1 of 3 scenes; elsewhere less than 1\u00a0% slower")
         lines[-1]["times"]["disturbed"] = "9 involuntary switches"
         self.assertTrue(taken(lines)[0].says.endswith("slower (the machine was disturbed)"))
 

@@ -54,8 +54,21 @@ class TestPaper(unittest.TestCase):
         says = summary.on_the_paper(found)
         for words in ("Of its 4 claims 2 hold, 1 hold with a condition, 0 do not hold and 1 are open", "1 decided by this study and 2 by the "
                       "reference run that comes with the project (Some CPU, 2026-01-02, commit 01234567)", "judges E2 otherwise",
-                      "(E3) holds with a condition (the reference run). Times as fast: a against b, 2 to 3."):  # fmt: skip
+                      "Claim E3 (E3) holds with a condition (the reference run)."):  # fmt: skip
             self.assertIn(words, says)
+
+    def test_the_main_claim_is_answered_before_its_verdict(self) -> None:
+        known = {"2006:2006": ("0.037 to 3.35, 1 (with motion)", "met nowhere"), "best:2006": ("1.04 to 40.1", "met from l = 3 on"),
+                 "best:best": ("0.0081 to 0.66", "met at 2 of 3 points (cloth 2k, l = 1; …)")}  # fmt: skip
+        corners = [{"id": id, "name": id, "rule": rule} for id, (_, rule) in known.items()]
+        self.write([{"id": "E3", "verdict": claims.CONDITION, "brief": "", "corners": corners, "ours": {id: span for id, (span, _) in known.items()}}])
+        self.assertEqual(
+            summary.parts_on_the_paper(self.paper(row("E3", claims.OPEN)))[0],
+            "Is updating a kinetic AABB tree faster than a bottom-up refit? Against a refit as in 2006: yes at its best (1.04 to 40.1 times as fast), "
+            "not always as in 2006 (0.037 to 3.35 times as fast). Against today's best refit: no (0.0081 to 0.66 times as fast). Claim E3 (E3) holds "
+            "with a condition: at its best against the refit of 2006 met from 3 frames a keyframe on; as in 2006 against the refit of 2006 met nowhere; at its best "
+            "against today's best refit met at 2 of 3 points (the reference run).",
+        )
 
     def test_the_reference_run_does_not_stand_in_for_itself(self) -> None:
         found = self.paper(row("E1", claims.OPEN), folder="reference")
@@ -89,11 +102,12 @@ class TestSentences(unittest.TestCase):
     def test_what_to_take_follows_the_rule(self) -> None:
         said = self.said([line("refit", 2.0), other("join", 1.0, foresight="next_keyframe")])
         self.assertEqual(
-            said["What to take"],
-            "With 10 frames a keyframe and more, take refit where nothing is known: the best refit in the only cell, at 2.00 ms a frame; join if the "
-            "next keyframe is known: 2.00 times as fast as the best refit (in 1 cell), at 1.00 ms a frame.",
+            "With 10 frames a keyframe and more, take refit where nothing is known: the best refit in the only scene, at 2.00 ms a frame (4k primitives); "
+            "join if the next keyframe is known: 2.00 times as fast as the refit (in 1 scene), at 1.00 ms a frame (4k primitives).",
+            said["What to take"].split(" This study")[0],
         )
-        self.assertIn("Pairs within a body and rays were not asked for", said["Other questions"])
+        self.assertIn("This study has at most 4k primitives (triangles).", said["What to take"])
+        self.assertIn("Pairs within a body (self-collision) and rays were not asked for", said["Self-collision, rays"])
         self.assertIn("answers wrongly", said["Time against error"])
 
     def test_what_a_study_did_not_ask_is_answered_by_measurements_that_come_with_the_project(self) -> None:
@@ -106,14 +120,34 @@ class TestSentences(unittest.TestCase):
         situations = advice.situations(advice.cells(self.study(lines)))
         with tempfile.TemporaryDirectory(prefix="kbvh-analysis-") as name:
             folder = Path(name)
-            self.assertEqual(summary.on_others(situations, folder), "Pairs within a body and rays were not asked for in this study.")
+            self.assertEqual(summary.on_others(situations, folder), "Pairs within a body (self-collision) and rays were not asked for in this study.")
             (folder / "cells.json").write_text(cells_file.content(cells_file.of_study(self.study(kept))), encoding="utf-8")
             says = summary.on_others(situations, folder)
-            self.assertRegex(says, r"not asked for in this study\. By measurements that come with the project \(plan .*\): With 10 frames .* and rays, take refit where")
+            self.assertRegex(says, r"not asked for in this study\. By measurements that come with the project \(.*2026-.*\): With 10 frames .* and rays, take refit where")
             self.assertNotIn("come with", summary.on_others(advice.situations([*advice.cells(self.study(kept)), *self.within()]), folder))
             self.assertNotIn("come with", summary.on_errors([], folder))
             (folder / "errors.json").write_text(time_error_file.content(time_error.places(self.study([*lines, wrong]))), encoding="utf-8")
             self.assertRegex(summary.on_errors([], folder), r"come with the project: Without knowledge .* Measured .*commit ")
+
+    def test_sizes_that_a_study_lacks_are_told_from_the_cells_that_come_with_the_project(self) -> None:
+        def sized(primitives: int) -> list[dict[str, Any]]:
+            lines = [line("refit", 2.0), other("join", 1.0, foresight="next_keyframe")]
+            for one in lines:
+                one["scene"].update(primitives=primitives)
+            return lines
+
+        own = advice.situations(advice.cells(self.study(sized(4000))))
+        with tempfile.TemporaryDirectory(prefix="kbvh-analysis-") as name:
+            folder = Path(name)
+            self.assertEqual(
+                summary.on_larger(own, folder),
+                ["This study has at most 4k primitives (triangles). 10k to 100k and 100k and more were not measured."],
+            )
+            (folder / "cells.json").write_text(cells_file.content(cells_file.of_study(self.study(sized(20000)))), encoding="utf-8")
+            (says,) = summary.on_larger(own, folder)
+            self.assertRegex(says, r"project \(.*\), 10k to 100k primitives: With 10 frames a keyframe and more: refit, 2\.00 ms a frame \(20k primitives\); "
+                             r"join if the next keyframe is known, 1\.00 ms a frame \(20k primitives\)\. 100k and more was not measured\.")  # fmt: skip
+            self.assertEqual(summary.on_larger(advice.situations(advice.cells(self.study(sized(200000)))), folder), [])
 
     def within(self) -> list[advice.MeasuredCell]:
         lines = [line("refit", 2.0, "alone"), other("join", 1.0, "alone", foresight="next_keyframe")]

@@ -97,7 +97,7 @@ await check("the report's top answers, and its links unfold what they lead to", 
   const page = await open("reference", "", { file: "report", width: 1280 });
   assert.deepEqual(await page.$$eval(".sentences a", (list) => list.map((one) => one.textContent)), [
     "What to take",
-    "Other questions",
+    "Self-collision, rays",
     "Time against error",
     "The paper",
     "This run",
