@@ -78,7 +78,7 @@ std::int32_t MeshBuilder::add_joint(const Joint& joint) {
 }
 
 void MeshBuilder::drive(std::uint32_t vertex, std::int32_t joint) {
-  mass_[vertex] = 1;
+  mass_[vertex] = 10;
   joint_[vertex] = joint;
 }
 

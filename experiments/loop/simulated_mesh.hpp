@@ -72,7 +72,7 @@ struct Physics {
   double friction = 0.3;                 ///< coefficient; 0: none
   double slip_speed = 0.01;              ///< m/s: slower than that, friction is less than its limit
   double tolerance = 2e-5;               ///< m: a step ends when no coordinate changes by more
-  std::uint32_t most_iterations = 60;    ///< of Newton's method in a step
+  std::uint32_t most_iterations = 120;   ///< of Newton's method in a step
 
   double radius() const { return thickness + reach; }
 };
@@ -146,7 +146,7 @@ class MeshBuilder {
   void fix(std::uint32_t vertex) { fixed_[vertex] = obstacle_[vertex] = 1; }
   /// Adds a joint and returns its number.
   std::int32_t add_joint(const Joint& joint);
-  /// Lets a vertex follow a joint: a particle of 1 kg, whose flight without forces is the script. Contact can
+  /// Lets a vertex follow a joint: a particle of 10 kg, whose flight without forces is the script. Contact can
   /// hold it back a little (StepReport::lag).
   void drive(std::uint32_t vertex, std::int32_t joint);
   void move(std::uint32_t vertex, const Eigen::Vector3d& by) { vertices_[vertex] += by; }
