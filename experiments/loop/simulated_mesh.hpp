@@ -146,8 +146,8 @@ class MeshBuilder {
   void fix(std::uint32_t vertex) { fixed_[vertex] = obstacle_[vertex] = 1; }
   /// Adds a joint and returns its number.
   std::int32_t add_joint(const Joint& joint);
-  /// Lets a vertex follow a joint: a particle of 10 kg, whose flight without forces is the script. Contact can
-  /// hold it back a little (StepReport::lag).
+  /// Lets a vertex follow a joint: a particle of 10 kg, whose flight without forces is the script. Contact
+  /// can hold it back a little (StepReport::lag).
   void drive(std::uint32_t vertex, std::int32_t joint);
   void move(std::uint32_t vertex, const Eigen::Vector3d& by) { vertices_[vertex] += by; }
   /// Returns the mesh, with its edges, inner vertices, and no velocity.
