@@ -15,20 +15,21 @@ namespace kbvh {
 template <class S>
 using VertexRows = Eigen::Matrix<S, Eigen::Dynamic, 3, Eigen::RowMajor>;
 
-/// Returns the numbers of a matrix of vertices in place, for `World::add_body` and `set_positions`. A row is a
-/// vertex, and the rows follow each other in memory: VertexRows, or a map of it. Other layouts (Eigen's
+/// Returns the numbers of a matrix of vertices in place, for `World::add_body` and `set_positions`. A row is
+/// a vertex, and the rows follow each other in memory: VertexRows, or a map of it. Other layouts (Eigen's
 /// default is column by column) do not compile: assign them to a VertexRows first. Keyframes one below
 /// the other in one matrix are a clip.
 template <class Derived>
 std::span<const typename Derived::Scalar> vertex_span(const Eigen::DenseBase<Derived>& vertices) {
-  static_assert(Derived::IsRowMajor && Derived::ColsAtCompileTime == 3, "rows of three coordinates in sequence");
+  static_assert(Derived::IsRowMajor && Derived::ColsAtCompileTime == 3,
+                "rows of three coordinates in sequence");
   static_assert(Derived::InnerStrideAtCompileTime == 1 && Derived::OuterStrideAtCompileTime == 3,
                 "coordinates in sequence, without gaps");
   return {vertices.derived().data(), std::size_t(vertices.size())};
 }
 
-/// Returns the indices of a matrix of triangles in place, for `Connectivity::indices`. A row is a triangle, and
-/// the rows follow each other in memory. Indices have 32 bits; negative ones are refused when the body is
+/// Returns the indices of a matrix of triangles in place, for `Connectivity::indices`. A row is a triangle,
+/// and the rows follow each other in memory. Indices have 32 bits; negative ones are refused when the body is
 /// added, as too large.
 template <class Derived>
 std::span<const std::uint32_t> triangle_span(const Eigen::DenseBase<Derived>& triangles) {
@@ -41,8 +42,8 @@ std::span<const std::uint32_t> triangle_span(const Eigen::DenseBase<Derived>& tr
   return {reinterpret_cast<const std::uint32_t*>(triangles.derived().data()), std::size_t(triangles.size())};
 }
 
-/// Returns the positions of `World::current_positions` as a matrix in place, valid as long as they are. Throws
-/// std::invalid_argument if S is not the world's scalar.
+/// Returns the positions of `World::current_positions` as a matrix in place, valid as long as they are.
+/// Throws std::invalid_argument if S is not the world's scalar.
 template <class S>
 Eigen::Map<const VertexRows<S>> vertex_rows(const WorldPositions& positions) {
   static_assert(std::is_same_v<S, float> || std::is_same_v<S, double>);

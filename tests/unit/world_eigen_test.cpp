@@ -51,7 +51,8 @@ TEST(WorldEigen, WrongScalarsAndIndicesAreRefused) {
   Faces faces(1, 3);
   faces << 0, 1, -2;
   World world(Precision::float64);
-  EXPECT_THROW(world.add_body("negative", {triangle_span(faces)}, vertex_span(vertices)), std::invalid_argument);
+  EXPECT_THROW(world.add_body("negative", {triangle_span(faces)}, vertex_span(vertices)),
+               std::invalid_argument);
   faces << 0, 1, 2;
   const std::uint32_t body = world.add_body("resting", {triangle_span(faces)}, vertex_span(vertices));
   world.start("bottom_up");
