@@ -127,7 +127,11 @@ def _panel(figure: Figure, place: int, title: str, log: bool = False) -> Axes:
 
 
 def _key(axes: Axes) -> None:
-    axes.legend(loc="upper right", frameon=False, fontsize=7.5, handlelength=1.4, labelspacing=0.25, borderaxespad=0.2)
+    """Draws the key above the lines: the axis grows by its height."""
+    key = axes.legend(loc="upper right", frameon=False, fontsize=7.5, handlelength=1.4, labelspacing=0.25, borderaxespad=0.2)
+    low, high = axes.get_ylim()
+    share = 0.1 * len(key.get_texts())
+    axes.set_ylim(low, high * (high / low) ** share if axes.get_yscale() == "log" else high + share * (high - low))
 
 
 def over_time(simulation: Simulation) -> Optional[Figure]:
