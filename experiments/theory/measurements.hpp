@@ -54,9 +54,10 @@ struct CurveRun {
   std::uint64_t pieces = 0, over_lambda = 0;  ///< bounds x segments; with more changes than lambda_s(n) - 1
   std::uint64_t most_changes = 0;             ///< of one bound in one segment
   double fullest = 0;                         ///< share of lambda_s(n) - 1, n >= 8 vertices below
+  std::uint64_t built = 0;                    ///< `most_changes` for which the scene was built; 0: for none
 };
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CurveRun, scene, triangles, vertices, segments, order, events, changes,
-                                   bounds, pieces, over_lambda, most_changes, fullest)
+                                   bounds, pieces, over_lambda, most_changes, fullest, built)
 
 /// The same clip with the log of every change, checked against independently computed exact envelopes
 /// (envelope.hpp).

@@ -234,6 +234,18 @@ class Runner {
     for (const std::uint32_t triangles : {1000u, 4000u})
       fans_.push_back(get<CountRun>("counts", "fan", std::to_string(triangles),
                                     [&] { return measure_counts(fan_scene(triangles)); }));
+    for (const std::uint32_t n : {8U, 32U, 128U})
+      curves_.push_back(get<CurveRun>("curves", "parabolas", std::to_string(n), [&] {
+        CurveRun run = measure_curves(parabolas_scene(n));
+        run.built = 2 * n - 2;
+        return run;
+      }));
+    for (const std::uint32_t n : {2U, 8U})
+      curves_.push_back(get<CurveRun>("curves", "cubics", std::to_string(n), [&] {
+        CurveRun run = measure_curves(cubics_scene(n));
+        run.built = 3 * n - 3;
+        return run;
+      }));
     constructed_ = get<std::vector<FrameRun>>("frames", "tangents", "16", [&] {
       return measure_frames(tangents_scene(16), std::vector<std::uint32_t>{1});
     });

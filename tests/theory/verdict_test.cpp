@@ -10,6 +10,7 @@
 #include "experiments/theory/judge.hpp"
 #include "experiments/theory/measure_boxtree.hpp"
 #include "experiments/theory/measure_counts.hpp"
+#include "experiments/theory/measure_curves.hpp"
 #include "experiments/theory/measure_exact.hpp"
 #include "experiments/theory/measure_separation.hpp"
 #include "experiments/theory/theory.hpp"
@@ -189,6 +190,11 @@ TEST(Verdict, NumberOfEvents) {
   EXPECT_EQ(with_curves(curves), holds);
   curves.over_lambda = 1;
   EXPECT_EQ(with_curves(curves), fails);
+  curves.over_lambda = 0;
+  curves.built = curves.most_changes = 14;
+  EXPECT_EQ(with_curves(curves), holds);
+  --curves.most_changes;
+  EXPECT_EQ(with_curves(curves), fails);
   for (CountRun& run : good) run.events *= run.vertices;
   EXPECT_EQ(judge_number_of_events(good, {}, fit_growth(good, 6)).verdict(), fails);
   for (CountRun& run : good) run.breakpoint_bound = 1e18;
@@ -312,6 +318,22 @@ TEST(Constructed, OneBoundChangesHandsFifteenTimesInOneFrame) {
   EXPECT_EQ(exact.most_breakpoints, 15u);
   EXPECT_EQ(exact.fullest, 1.0);
   EXPECT_EQ(judge_never_more_updates({}, runs).verdict(), condition);
+}
+
+TEST(Constructed, ParabolasReachTheBoundOfOrderTwoAndCubicsExceedIt) {
+  for (const std::uint32_t n : {2u, 8u, 128u}) {
+    const CurveRun run = measure_curves(parabolas_scene(n));
+    EXPECT_EQ(run.order, 2u);
+    EXPECT_EQ(run.most_changes, 2 * n - 2);
+    EXPECT_EQ(run.over_lambda, 0u);
+    EXPECT_EQ(run.fullest, n < 8 ? 0.0 : 1.0);
+  }
+  for (const std::uint32_t n : {2u, 3u, 8u, 12u}) {
+    const CurveRun run = measure_curves(cubics_scene(n));
+    EXPECT_EQ(run.order, 3u);
+    EXPECT_EQ(run.most_changes, 3 * n - 3);
+    EXPECT_EQ(run.over_lambda, 0u);
+  }
 }
 
 TEST(Constructed, TheHubOfAFanTakesPartInEveryLeaf) {
