@@ -89,7 +89,6 @@ class ListPool {
     for (auto& begins : free_) begins.clear();
   }
 
-  std::size_t value_count() const { return values_.size(); }
   std::size_t bytes() const {
     std::size_t total = lists_.capacity() * sizeof(List) + values_.capacity() * sizeof(std::uint32_t) +
                         free_.capacity() * sizeof(std::vector<std::uint32_t>);

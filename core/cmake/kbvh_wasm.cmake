@@ -13,3 +13,5 @@ foreach(library boost/version.hpp nlohmann/json.hpp)
   file(CREATE_LINK ${KBVH_HOST_${folder}}/${folder} ${CMAKE_BINARY_DIR}/headers/${folder} SYMBOLIC)
 endforeach()
 set(Boost_INCLUDE_DIR ${CMAKE_BINARY_DIR}/headers CACHE PATH "" FORCE)
+# Eigen's headers have a folder of their own already.
+find_package(Eigen3 3.4 REQUIRED NO_MODULE PATHS /usr /usr/local NO_CMAKE_FIND_ROOT_PATH)

@@ -132,7 +132,6 @@ struct EnvelopeReport {
   double fullest = 0;                  ///< largest used share of n - 1, over n >= 8
 
   bool holds() const { return violation.empty(); }
-  bool general_position() const { return several_steps == 0 && choices == 0; }
   void add(const EnvelopeReport& other);
 };
 

@@ -6,35 +6,11 @@
 
 #include "core/families/blend/kernels/blend_rows.hpp"
 #include "core/families/blend/reduced_model.hpp"
-#include "core/families/blend/symmetric_eigen.hpp"
 #include "core/kernels/kernel_set.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
 namespace kbvh::test::reduced_model_test {
 namespace {
-
-TEST(SymmetricEigen, ReproducesTheMatrix) {
-  for (const std::size_t n : {std::size_t(1), std::size_t(2), std::size_t(7), std::size_t(40)}) {
-    Random random(n);
-    std::vector<double> matrix(n * n);
-    for (std::size_t i = 0; i < n; ++i)
-      for (std::size_t j = 0; j <= i; ++j) matrix[i * n + j] = matrix[j * n + i] = 1e60 * random.unit();
-    const SymmetricEigen eigen = decompose(matrix, n);
-    for (std::size_t i = 0; i < n; ++i) {
-      EXPECT_LE(eigen.values[i], eigen.values[i > 0 ? i - 1 : 0]);
-      for (std::size_t j = 0; j < n; ++j) {
-        double sum = 0, product = 0;
-        for (std::size_t k = 0; k < n; ++k) {
-          sum += eigen.values[k] * eigen.vectors[k * n + i] * eigen.vectors[k * n + j];
-          product += eigen.vectors[i * n + k] * eigen.vectors[j * n + k];
-        }
-        EXPECT_NEAR(sum / 1e60, matrix[i * n + j] / 1e60, 1e-12);
-        EXPECT_NEAR(product, i == j ? 1 : 0, 1e-12);
-      }
-    }
-  }
-  EXPECT_EQ(decompose(std::vector<double>(9, 0.0), 3).values, (std::vector<double>{0, 0, 0}));
-}
 
 /// Plans of `vertices` vertices: a moving centre, and `modes` random fields.
 template <class S>

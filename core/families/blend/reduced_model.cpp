@@ -1,10 +1,9 @@
 #include "core/families/blend/reduced_model.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
-
-#include "core/families/blend/symmetric_eigen.hpp"
 
 namespace kbvh {
 namespace {
@@ -124,19 +123,25 @@ ReducedModel<S>::ReducedModel(const FlightPlans<S>& plans, const Settings& setti
   // Shapes: eigenvectors of the snapshots' inner products give those of their covariance.
   Offsets<S> snapshots(plans, rest, translations, spaced(keyframes, samples));
   const std::size_t n = snapshots.keyframes();
-  const SymmetricEigen eigen = decompose(gram_matrix(snapshots), n);
+  const std::vector<double> gram = gram_matrix(snapshots);
+  const auto size = Eigen::Index(n);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
+      Eigen::Map<const Eigen::MatrixXd>(gram.data(), size, size));
+  const bool decomposed = eigen.info() == Eigen::Success;  // else without modes: the remainder is everything
+  const auto variance = [&](std::size_t mode) { return eigen.eigenvalues()[size - 1 - Eigen::Index(mode)]; };
   double tail = 0;
-  for (const double value : eigen.values) tail += std::max(value, 0.0);
+  for (std::size_t m = 0; decomposed && m < n; ++m) tail += std::max(variance(m), 0.0);
   const double enough = settings.tolerance * settings.tolerance * double(n) * double(vertices);
   const double least = 1e-13 * std::max(tail, 0.0);  // below that values are rounding errors
   while (mode_count < std::min<std::size_t>(settings.most_modes, n) && tail > enough &&
-         eigen.values[mode_count] > least)
-    tail -= eigen.values[mode_count++];
+         variance(mode_count) > least)
+    tail -= variance(mode_count++);
   shapes.assign(mode_count, std::vector<S>(count + 1, 0));
   std::vector<double> factors(n * mode_count);  // [keyframe][mode]
   for (std::size_t m = 0; m < mode_count; ++m)
     for (std::size_t k = 0; k < n; ++k)
-      factors[k * mode_count + m] = eigen.vectors[m * n + k] / std::sqrt(eigen.values[m]);
+      factors[k * mode_count + m] =
+          eigen.eigenvectors()(Eigen::Index(k), size - 1 - Eigen::Index(m)) / std::sqrt(variance(m));
   std::vector<double> sums(mode_count);
   snapshots.for_blocks([&](std::size_t first, std::size_t many, const double* values) {
     for (std::size_t i = 0; i < many; ++i) {
