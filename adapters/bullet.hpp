@@ -1,11 +1,12 @@
 #pragma once
-// The shared part of both contestants of Bullet (Coumans). Both compute in float, as Debian's Bullet does,
-// and accept float scenes only. btOptimizedBvh takes triangles, btDbvt boxes.
+// The shared part of the contestants of Bullet (Coumans). They compute in float, as Debian's Bullet does, and
+// accept float scenes only. btOptimizedBvh takes triangles, btDbvt boxes.
 //
 // Range. bullet_bvh: 1e18. Bullet initialises boxes with that value (BT_LARGE_FLOAT). With scale=none a box
 // beyond it extends back to it, is quantised to a negative number of cells, and is wrong after the conversion
 // to unsigned. bullet_dbvt: everything admissible. Products of extents decide how its tree is built, at a
-// moderate scale; its queries, refits and insertions only add and compare.
+// moderate scale; its queries, refits and insertions only add and compare. bullet_cones: everything
+// admissible. Its tree is made without coordinates, and normals are computed in double.
 #include <LinearMath/btVector3.h>
 
 #include <algorithm>
@@ -90,7 +91,7 @@ class Contestant : public CountedStrategy<float>, public TakesPlanChanges<float>
   std::vector<std::uint8_t> moves_;
 };
 
-/// Returns the Info that both registrations share.
+/// Returns the Info that the registrations share.
 inline Info info(const char* id, const char* title) {
   Info made;
   made.id = id;

@@ -5,6 +5,7 @@
 //   also changes the tree. The default `update=refit` instead recomputes the volumes of all nodes, children
 //   first, with Bullet's Merge. That loop is not part of Bullet, but ten times faster. Boxes are tight in
 //   both cases.
+// - collideTT of a tree with itself finds each pair of two leaves once: pairs within a body.
 // - Insertions build the first tree. They make a list of identical boxes, which optimizeTopDown() divides.
 #include "bullet.hpp"
 
@@ -15,24 +16,28 @@
 
 #include "core/base/heap_block.hpp"
 #include "core/geometry/lane_box.hpp"
+#include "core/scene/self_pairs.hpp"
 
 namespace kbvh::bullet {
 namespace {
 
-/// Collects overlapping leaves of two dynamic trees.
+/// Collects overlapping leaves of two dynamic trees, or of one with itself.
 class LeafHits final : public btDbvt::ICollide {
  public:
   BodyPair bodies{};
+  const Primitives* within = nullptr;  ///< the primitives of the body, if it is one with itself
   PairBuffer* out = nullptr;
 
   using btDbvt::ICollide::Process;
   void Process(const btDbvtNode* a, const btDbvtNode* b) override {
-    out->push_back({bodies.first, std::uint32_t(a->dataAsInt), bodies.second, std::uint32_t(b->dataAsInt)});
+    PrimitivePair pair{bodies.first, std::uint32_t(a->dataAsInt), bodies.second, std::uint32_t(b->dataAsInt)};
+    if (within == nullptr || keep_self_pair(within, LeavesOf::two, pair.primitive_a, pair.primitive_b))
+      out->push_back(pair);
   }
 };
 
 template <class S>
-class BulletDbvt final : public Contestant {
+class BulletDbvt final : public Contestant, public AnswersSelfPairs {
   static_assert(std::is_same_v<S, float>);
 
  public:
@@ -61,6 +66,7 @@ class BulletDbvt final : public Contestant {
     for (const std::uint32_t i : this->near_bodies_.find(box_of, tests)) {
       const BodyPair& pair = this->scene_.pairs()[i];
       hits_.bodies = pair;
+      hits_.within = pair.first == pair.second ? &this->scene_.primitives(pair.first) : nullptr;
       // Like collideTT, with a stack that stays allocated.
       bodies_[pair.first].tree.collideTTpersistentStack(bodies_[pair.first].tree.m_root,
                                                         bodies_[pair.second].tree.m_root, hits_);

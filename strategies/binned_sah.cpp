@@ -30,6 +30,7 @@ KBVH_STRATEGY(binned_sah) {
       .parameters = {{"grain",
                       "1",
                       {"1", "16"},
-                      "primitives that stay together, neighbours on a Hilbert curve; 16: full leaves"}},
+                      "primitives that stay together, neighbours on a Hilbert curve; 16: full leaves"},
+                     threads_parameter("positions, builds, queries, rays and triangle tests")},
   })};
 }

@@ -109,6 +109,6 @@ KBVH_STRATEGY(bottom_up) {
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 16}},
       .parameters = {{"kernels", "auto", kernel_words(),
                       "instruction set of refit and query; auto: the widest that this machine supports"},
-                     threads_parameter("positions, refit, query and triangle tests")},
+                     threads_parameter("positions, refit, query, rays and triangle tests")},
   })};
 }

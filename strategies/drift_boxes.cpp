@@ -4,7 +4,8 @@
 // old boxes touch. One traversal, over boxes swept over the motion of several frames, therefore finds the
 // candidates of all these frames, in the order in which the motion lets them meet, and a frame takes a prefix
 // of that list (core/families/drift/near_pairs.hpp). Bodies that cannot meet any other body get one box per
-// frame and no boxes below it.
+// frame and no boxes below it. Pairs within a body depend on how much the displacements of its own vertices
+// differ: a body that moves as a whole keeps its list.
 //
 // The displacements are found by reading each vertex twice (then and now, in memory order), or, in the
 // variant with a bound on steps, by one addition per body. `drift_boxes_approximate` assumes only a share of
@@ -29,6 +30,7 @@ namespace {
 
 template <class S, class Motion>
 class DriftStrategy : public CountedStrategy<S>,
+                      public AnswersSelfPairs,
                       public AnswersProbes<S>,
                       public TakesPlanChanges<S>,
                       public ReportsWork {
@@ -65,7 +67,7 @@ class DriftStrategy : public CountedStrategy<S>,
       std::fill_n(body.rate_high, 3, 0.0);
       body.watch = may_move(index) ? Watch::drift : Watch::nothing;
       make_boxes(index);
-      body.leaf_size = usual_leaf_side(hierarchies_[index]);
+      body.leaf_size = usual_leaf_side(hierarchies_[index], sides_);
       remember(index);
     }
     // A body that rests again may have been moved by its own plans before.
@@ -159,7 +161,7 @@ class DriftStrategy : public CountedStrategy<S>,
     for (const auto& lists : lists_of_) total += lists.bytes();
     for (const auto& rows : rows_) total += rows.bytes();
     return total + work_.bytes() + probes_.bytes() + near_bodies_.bytes() + pair_is_near_.size() +
-           near_pairs_.capacity() * sizeof(std::uint32_t);
+           near_pairs_.capacity() * sizeof(std::uint32_t) + sides_.capacity() * sizeof(double);
   }
 
  protected:
@@ -444,8 +446,8 @@ class DriftStrategy : public CountedStrategy<S>,
     search_due_ = false;
   }
   NearSide<S> side(std::uint32_t index) {
-    return {&hierarchies_[index], this->sampled_.positions(index), bodies_[index].margin, &rows_[index],
-            bodies_[index].rounding()};
+    return {&hierarchies_[index], this->sampled_.positions(index), bodies_[index].margin,
+            &rows_[index],        bodies_[index].rounding(),       &this->scene_.primitives(index)};
   }
 
   Motion motion_;
@@ -460,6 +462,7 @@ class DriftStrategy : public CountedStrategy<S>,
   std::vector<std::uint8_t> pair_is_near_;
   std::vector<NearPairs<S>> lists_of_;  ///< [near pair]; never shrinks
   NearWork<S> work_;
+  std::vector<double> sides_;  ///< of the leaves of a body, at a reset
   WideQuery<S> query_{this->scene_, this->sampled_};
   DriftProbes<S> probes_{this->scene_, this->sampled_};
   DriftModel model_;

@@ -29,6 +29,7 @@ KBVH_STRATEGY(implicit_tree) {
       .citation = "Chitalu et al. 2020; Kamel & Faloutsos 1993 (Hilbert order)",
       .declares = {.restructures = true, .time_budget = true},
       .topology = {.widths = {8}, .preferred = {.method = BuildMethod::morton, .width = 8, .leaf_size = 16}},
-      .parameters = {{"curve", "hilbert", {"hilbert", "morton"}, "the order in which leaves are filled"}},
+      .parameters = {{"curve", "hilbert", {"hilbert", "morton"}, "the order in which leaves are filled"},
+                     threads_parameter("positions, builds, queries, rays and triangle tests")},
   })};
 }

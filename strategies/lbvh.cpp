@@ -28,5 +28,6 @@ KBVH_STRATEGY(lbvh) {
       .citation = "Lauterbach et al. 2009",
       .declares = {.restructures = true, .time_budget = true},
       .topology = {.widths = {8}, .preferred = {.method = BuildMethod::morton, .width = 8, .leaf_size = 16}},
+      .parameters = {threads_parameter("positions, builds, queries, rays and triangle tests")},
   })};
 }

@@ -53,6 +53,7 @@ class LbvhDrift final : public BuiltStrategy<S, DriftBuilder<S>> {
     tree.wanted = false;
     ++builds_;
   }
+  bool watches_searches() const override { return true; }
   void searched(const BodyPair& pair, std::uint64_t tests, std::uint64_t found) override {
     trees_[pair.first].age.add(tests, found);
     if (pair.second != pair.first) trees_[pair.second].age.add(tests, found);
@@ -80,7 +81,7 @@ KBVH_STRATEGY(lbvh_drift) {
       .citation = "Lauterbach, Yoon & Manocha 2006; Lauterbach et al. 2009",
       .declares = {.restructures = true, .time_budget = true},
       .topology = {.widths = {8}, .preferred = {.method = BuildMethod::morton, .width = 8, .leaf_size = 16}},
-      .parameters =
-          {{"price", "5", {}, "surplus box tests per primitive from which on a build pays", 0, 1e6}},
+      .parameters = {{"price", "5", {}, "surplus box tests per primitive from which on a build pays", 0, 1e6},
+                     threads_parameter("positions, builds, refits, rays and triangle tests")},
   })};
 }

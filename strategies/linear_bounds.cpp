@@ -1,7 +1,7 @@
 // Boxes that are linear in time: computed at both ends of each segment in which all flight plans are known to
-// be straight, and interpolated by the query at the nodes that it visits. Frames update nothing. Where
-// vertices move on curves, boxes grow by the most that a curve may leave its chord. Prior art:
-// core/adr/0010-prior-art-of-answering-intervals.md.
+// be straight, and interpolated by the query at the nodes that it visits: for pairs within a body, at all of
+// its nodes. Frames update nothing. Where vertices move on curves, boxes grow by the most that a curve may
+// leave its chord. Prior art: core/adr/0010-prior-art-of-answering-intervals.md.
 
 #include "core/families/linear/linear_bounds.hpp"
 
@@ -13,6 +13,7 @@ namespace {
 
 template <class S>
 class LinearBoundsStrategy final : public CountedStrategy<S>,
+                                   public AnswersSelfPairs,
                                    public AnswersProbes<S>,
                                    public TakesPlanChanges<S> {
  public:
@@ -48,9 +49,11 @@ class LinearBoundsStrategy final : public CountedStrategy<S>,
         continue;
       }
       const WideMoment<S> first = moment(pair.first, t), second = moment(pair.second, t);
-      status.pending +=
-          query_.run(side(pair.first, first), side(pair.second, second), out, tests, rest_of(budget, tests))
-              .pending;
+      const bool self = pair.first == pair.second;
+      if (self) make_boxes(first, pair.first);
+      const WideSide<S> a = side(pair.first, self ? nullptr : &first);
+      const WideSide<S> b = side(pair.second, self ? nullptr : &second);
+      status.pending += query_.run(a, b, out, tests, rest_of(budget, tests)).pending;
     }
     this->count_.add(Counter::box_tests, tests);
     return status;
@@ -89,8 +92,19 @@ class LinearBoundsStrategy final : public CountedStrategy<S>,
       std::fill(stale_[body].begin(), stale_[body].end(), 1);
     }
   }
-  WideSide<S> side(std::uint32_t body, const WideMoment<S>& moment) {
-    return {.hierarchy = &bounds_.hierarchy(body), .body = body, .moment = &moment};
+  /// Computes the remaining boxes of a body at a moment.
+  void make_boxes(const WideMoment<S>& moment, std::uint32_t body) {
+    const auto& hierarchy = bounds_.hierarchy(body);
+    const auto make = wide_linear_kernels<S>(hierarchy.kernels()).make(hierarchy.width());
+    for (std::uint32_t node = 0; node < hierarchy.node_count(); ++node) {
+      if (moment.stale[node] == 0) continue;
+      make(moment, node);
+      moment.stale[node] = 0;
+    }
+  }
+  /// `moment`: null if all boxes of the body are those of the moment.
+  WideSide<S> side(std::uint32_t body, const WideMoment<S>* moment) {
+    return {.hierarchy = &bounds_.hierarchy(body), .body = body, .moment = moment};
   }
   WideMoment<S> moment(std::uint32_t body, double t) {
     return {bounds_.hierarchy(body).arrays(), bounds_.side(body).ends(), stale_[body].data(),

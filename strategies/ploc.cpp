@@ -32,11 +32,11 @@ KBVH_STRATEGY(ploc) {
       .citation = "Meister & Bittner 2018",
       .declares = {.restructures = true, .time_budget = true},
       .topology = {.widths = {8}, .preferred = {.method = BuildMethod::morton, .width = 8, .leaf_size = 16}},
-      .parameters =
-          {{"radius", "8", {"8", "16"}, "clusters searched on each side for the best partner"},
-           {"grain",
-            "1",
-            {"1", "16"},
-            "primitives in a cluster at the start, neighbours on a Hilbert curve; 16: full leaves"}},
+      .parameters = {{"radius", "8", {"8", "16"}, "clusters searched on each side for the best partner"},
+                     {"grain",
+                      "1",
+                      {"1", "16"},
+                      "primitives in a cluster at the start, neighbours on a Hilbert curve; 16: full leaves"},
+                     threads_parameter("positions, builds, queries, rays and triangle tests")},
   })};
 }

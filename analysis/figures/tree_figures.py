@@ -105,7 +105,7 @@ def _agree(a: pd.DataFrame, b: pd.DataFrame) -> bool:
 def _lines(axes: Axes, shared: list[tuple[pd.Series, pd.DataFrame, int]], looks: Looks, column: str) -> None:
     for row, curve, _ in shared:
         look = looks[row["contestant"]]
-        axes.plot(curve["t"], curve[column], linestyle=look.line, color=look.colour, marker=look.marker,
+        axes.plot(curve["t"], curve[column], linestyle=look.line, color=look.colour, marker=look.drawn,
                   markerfacecolor=look.face, markersize=4.5, markeredgewidth=1.1, clip_on=False)  # fmt: skip
     axes.xaxis.set_major_locator(MaxNLocator(6))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: tick(value)))
@@ -127,7 +127,7 @@ def events_by_depth(group: pd.DataFrame, looks: Looks) -> Optional[Figure]:
     for row in rows.itertuples():
         look = looks[row.contestant]
         counted = [(depth, n / row.frames) for depth, n in enumerate(row.events_at_depth) if n > 0]
-        axes.plot(*zip(*counted), linestyle=look.line, color=look.colour, marker=look.marker, markerfacecolor=look.face,
+        axes.plot(*zip(*counted), linestyle=look.line, color=look.colour, marker=look.drawn, markerfacecolor=look.face,
                   markersize=5.5, markeredgewidth=1.3)  # fmt: skip
     axes.xaxis.set_major_locator(MaxNLocator(12, integer=True))
     axes.set_xlabel("depth of the node (0: root)")

@@ -21,7 +21,7 @@ COLOURS = """<style>
 .errors figcaption.title { display: none; }  /* the heading says it */
 .errors summary { cursor: pointer; }
 @media (max-width: 760px) { .errors .error-table { font-size: .7rem; } .errors .error-table :is(td, th) { padding: .25rem .2rem .25rem 0; }
-  .errors .error-table .n { padding-left: .1rem; overflow-wrap: anywhere; } }
+  .errors .error-table .n { padding-left: .1rem; } .errors .error-table td.n { white-space: nowrap; } }
 body[data-theme="dark"] .errors [style] { --paint: var(--d); }
 body[data-theme="light"] .errors [style] { --paint: var(--l); }
 </style>"""

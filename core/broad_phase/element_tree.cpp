@@ -52,7 +52,7 @@ void ElementTree<S>::refresh(const S* vertex_boxes, double most_growth) {
   if (state_ == State::current) return;
   if (state_ == State::outdated && !tree_.empty()) {
     element_box_kernels<S>(kernels_).leaves(leaf_job(vertex_boxes));
-    build_kernels<S>(kernels_).nodes(tree_.arrays(), tree_.leaf_boxes(), tree_.node_count());
+    build_kernels<S>(kernels_).nodes(tree_.arrays(), tree_.leaf_boxes(), 0, tree_.node_count());
     ++work_.refits;
     if (!(surface() > most_growth * surface_when_built_)) {
       state_ = State::current;

@@ -85,7 +85,7 @@ void swept(const FramePair& frames, int repetitions, Table& table) {
                 repetitions);
 }
 
-/// Vertex-face candidates alone, in float, on trees that stay: peers whose trees find no pairs within a body.
+/// Vertex-face candidates alone, in float, on trees that stay: not every peer finds pairs within a body.
 void swept_by_trees(const FramePair& frames, int repetitions, Table& table) {
   const Mesh<float> mesh(frames);
   BroadPhase<float> known;

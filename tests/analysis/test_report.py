@@ -15,6 +15,7 @@ from typing import Any, Optional
 import paths  # noqa: F401  (finds the modules under test)
 import synthetic
 
+from figures import colours
 from report import report, tables
 
 
@@ -161,6 +162,14 @@ class TestPage(ReportCase):
         self.page(lines, figures="all")
         costs = list((self.folder / "figures").glob("*-cost.png"))
         self.assertEqual(len(costs), 2)
+
+    def test_families_of_others_have_their_mark_in_every_figure(self) -> None:
+        families = {"kinetic_aabb": "one's own", "linear_bounds": "another's", "embree_refit": "a third's", "bottom_up": "refit"}
+        wanted = [c for c in synthetic.CONTESTANTS if c["id"] in families]
+        lines = [synthetic.record({**c, "family": families[c["id"]]}, "tablecloth", 2000, "float", l) for l in (1, 30) for c in wanted]
+        marks = {look.marker for look in colours.looks([(line["key"], line["strategy"]["id"], line["strategy"]["family"]) for line in lines]).values()}
+        self.assertGreaterEqual(marks, {marker for _, marker in colours.FREE})
+        self.page(lines, figures="all")
 
     def test_title(self) -> None:
         self.assertIn("<h1>My &lt;cloth&gt;</h1>", self.page(small(), title="My <cloth>"))

@@ -34,11 +34,12 @@ enum class Fault : std::uint8_t {
   unmade_tree,      // every eighth tree is not built: the previous one stays in use
   unsorted_boxes,   // boxes are swept on a different axis than they are sorted on
   unmade_boxes,     // boxes are those of the first frame
+  neighbours_kept,  // primitives of a body that share a vertex are a pair
 };
 
 /// Boxes linear in time, with one query per frame.
 template <class S, Fault fault>
-class Linear : public CountedStrategy<S>, public TakesPlanChanges<S> {
+class Linear : public CountedStrategy<S>, public AnswersSelfPairs, public TakesPlanChanges<S> {
  public:
   static constexpr Foresight foresight = Foresight::next_keyframe;
   Linear(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies, const Params&)
@@ -66,9 +67,15 @@ class Linear : public CountedStrategy<S>, public TakesPlanChanges<S> {
     for (const std::uint32_t i : bounds_.segment().near_pairs) {
       const BodyPair& pair = this->scene_.pairs()[i];
       const WideMoment<S> first = moment(pair.first, t), second = moment(pair.second, t);
-      query_.run({.hierarchy = &bounds_.hierarchy(pair.first), .body = pair.first, .moment = &first},
-                 {.hierarchy = &bounds_.hierarchy(pair.second), .body = pair.second, .moment = &second}, out,
-                 tests);
+      const bool self = pair.first == pair.second;
+      if (self) make_boxes(first, pair.first);
+      query_.run({.hierarchy = &bounds_.hierarchy(pair.first),
+                  .body = pair.first,
+                  .moment = self ? nullptr : &first},
+                 {.hierarchy = &bounds_.hierarchy(pair.second),
+                  .body = pair.second,
+                  .moment = self ? nullptr : &second},
+                 out, tests);
     }
     return {};
   }
@@ -89,6 +96,12 @@ class Linear : public CountedStrategy<S>, public TakesPlanChanges<S> {
       std::fill(stale_[body].begin(), stale_[body].end(), 1);
     }
   }
+  void make_boxes(const WideMoment<S>& moment, std::uint32_t body) {
+    if (fault == Fault::unmade_boxes && made_++ != 0) return;
+    const auto& hierarchy = bounds_.hierarchy(body);
+    for (std::uint32_t node = 0; node < hierarchy.node_count(); ++node)
+      wide_linear_kernels<S>(hierarchy.kernels()).make(hierarchy.width())(moment, node);
+  }
   WideMoment<S> moment(std::uint32_t body, double t) {
     const S fraction = bounds_.fraction(t);
     return {bounds_.hierarchy(body).arrays(), bounds_.side(body).ends(), stale_[body].data(),
@@ -97,7 +110,7 @@ class Linear : public CountedStrategy<S>, public TakesPlanChanges<S> {
   LinearBounds<S> bounds_;
   WideQuery<S> query_{this->scene_, this->sampled_};
   std::vector<std::vector<std::uint8_t>> stale_;
-  std::uint64_t ends_ = 0;
+  std::uint64_t ends_ = 0, made_ = 0;
 };
 
 /// One join for each segment, from which frames are read; with span tests if all bodies are triangles.
@@ -163,7 +176,7 @@ class Join : public CountedStrategy<S>, public TakesPlanChanges<S> {
 
 /// One list of near pairs for as many frames as the bound on the motion allows.
 template <class S, Fault fault>
-class Near : public StoredHierarchyStrategy<S> {
+class Near : public StoredHierarchyStrategy<S>, public AnswersSelfPairs {
   using Base = StoredHierarchyStrategy<S>;
 
  public:
@@ -219,7 +232,12 @@ class Near : public StoredHierarchyStrategy<S> {
       lists_[i].clear();
       if (this->hierarchies_[pair.first].empty() || this->hierarchies_[pair.second].empty()) continue;
       const auto side = [&](std::uint32_t body) -> NearSide<S> {
-        return {&this->hierarchies_[body], this->sampled_.positions(body), margins, &rows_[body]};
+        return {&this->hierarchies_[body],
+                this->sampled_.positions(body),
+                margins,
+                &rows_[body],
+                0,
+                fault == Fault::neighbours_kept ? nullptr : &this->scene_.primitives(body)};
       };
       lists_[i].build(side(pair.first), side(pair.second), pair.first, pair.second, reach, work_, tests);
     }
@@ -256,12 +274,15 @@ struct Halves {
   using Part = KeyRange;
   std::uint32_t shortened = 0;
   static std::uint32_t count(const Part& part) { return part.end - part.begin; }
+  static std::uint32_t size(const Part& part) { return count(part); }
   static double weight(const Part& part) { return count(part); }
+  static void expect(std::uint32_t /*leaves*/) {}
   static std::pair<Part, Part> split(const Part& part) {
     const std::uint32_t middle = part.begin + count(part) / 2;
     return {{part.begin, middle}, {middle, part.end}};
   }
-  std::pair<std::uint32_t, std::uint32_t> leaf(const Part& part) {
+  std::pair<std::uint32_t, std::uint32_t> leaf(std::uint32_t /*number*/, const Part& part,
+                                               std::uint32_t /*placed*/) {
     return {part.begin, part.end - (shortened-- == 1 ? 1 : 0)};
   }
 };
@@ -379,7 +400,11 @@ void expect_caught(const char* scene, const std::string& expected) {
 }
 
 TEST(FamilyFaults, SoundLinearBoundsPass) {
-  expect_sound<Linear>({"soups", "sheets", "plan_changes", "four_bodies_own_keyframes"});
+  expect_sound<Linear>({"soups", "sheets", "plan_changes", "four_bodies_own_keyframes", "self_rolled_cloth",
+                        "self_soup_alone", "self_plan_changes"});
+}
+TEST(FamilyFaults, LinearBoxesOfABodyWithItselfThatAreNotMade) {
+  expect_caught<Linear, Fault::unmade_boxes>("self_soup_alone", "not among the candidates");
 }
 TEST(FamilyFaults, ASegmentThatIsNotMade) {
   expect_caught<Linear, Fault::stale_segment>("soups", "protrudes");
@@ -414,7 +439,14 @@ TEST(FamilyFaults, PlansForgottenByTheJoin) {
 }
 
 TEST(FamilyFaults, SoundNearPairsPass) {
-  expect_sound<Near>({"soups", "sheets", "four_bodies_own_keyframes"});
+  expect_sound<Near>({"soups", "sheets", "four_bodies_own_keyframes", "self_rolled_cloth", "self_soup_alone",
+                      "self_sheets_crumpled"});
+}
+TEST(FamilyFaults, ClosingWithinABodyTakenForLess) {
+  expect_caught<Near, Fault::small_closing>("self_soup_alone", "not among the candidates");
+}
+TEST(FamilyFaults, NeighboursTakenForNearPairs) {
+  expect_caught<Near, Fault::neighbours_kept>("self_rolled_cloth", "is reported but does not intersect");
 }
 TEST(FamilyFaults, ClosingTakenForLess) {
   expect_caught<Near, Fault::small_closing>("soups", "not among the candidates");

@@ -16,6 +16,7 @@
 #include "core/scene/pairs_by_thread.hpp"
 #include "tests/conformance/check.hpp"
 #include "tests/support/grids.hpp"
+#include "tests/support/ray_sets.hpp"
 
 #if defined(KBVH_TEST_HAS_TBB)
 #include <tbb/global_control.h>
@@ -25,8 +26,8 @@ namespace kbvh::test {
 namespace {
 
 #if defined(KBVH_TEST_HAS_TBB)
-// Allows four threads on machines with fewer cores, too; set before the registry states its parameters.
-const tbb::global_control four(tbb::global_control::max_allowed_parallelism, 4);
+// Allows eight threads on machines with fewer cores, too; set before the registry states its parameters.
+const tbb::global_control eight(tbb::global_control::max_allowed_parallelism, 8);
 #endif
 
 /// A sheet of 2 side^2 triangles that waves over one keyframe after another.
@@ -137,6 +138,93 @@ TEST(Threads, AnswerTheSameInTheSameOrder) {
     if (entry.info.can.self_pairs) expect_same_answers<double>(entry, 64, Self::with);
   }
   EXPECT_GE(tried, 1u);
+}
+
+/// Rays from one point through the sheets, row by row, and then rays in all directions; at the first frame.
+template <class S>
+std::vector<Ray<S>> views(const Scene<S>& scene) {
+  Playback<S> playback(scene);
+  playback.seek(0);
+  playback.evaluate_all();
+  std::vector<Ray<S>> rays;
+  for (int j = 0; j < 32; ++j)
+    for (int i = 0; i < 32; ++i)
+      rays.push_back({{S(0.4), S(0.45), S(-3)}, {S((i - 15.5) / 90), S((j - 15.5) / 90), S(1)}});
+  const std::vector<Ray<S>> others = rays_at(scene, playback, 110, 5);
+  rays.insert(rays.end(), others.begin(), others.end());
+  return rays;
+}
+
+/// The hits of a strategy and what it counts, frame by frame.
+template <class S>
+std::vector<std::uint64_t> ray_answers(const StrategyEntry& entry, const Scene<S>& scene,
+                                       std::span<const Ray<S>> rays, std::uint32_t threads,
+                                       std::uint32_t leaf_size) {
+  BuilderConfig builder = entry.info.topology.preferred;
+  builder.leaf_size = leaf_size;
+  Session<S> session(scene, {&entry, {{"threads", std::to_string(threads)}}, builder});
+  std::vector<std::uint64_t> hashes;
+  std::vector<RayHit> hits(rays.size());
+  PairBuffer pairs;
+  PhaseTimes times;
+  for (const double t : frame_times(scene, 1)) {
+    hashes.empty() ? session.reset(t) : session.advance(t, times);
+    Hasher hasher;
+    for (const RayQuery query : {RayQuery::closest, RayQuery::any}) {
+      std::fill(hits.begin(), hits.end(), RayHit{.body = 7, .primitive = 7, .parameter = 7});
+      session.probe(RayProbes<S>{query, rays, std::span<RayHit>(hits)}, times);
+      hasher.bytes(hits.data(), hits.size() * sizeof(RayHit));
+    }
+    session.query(pairs, times);
+    const Counters counters = session.strategy().counters();
+    for (const Counter counter : {Counter::box_tests, Counter::triangle_tests, Counter::triangle_tests_exact,
+                                  Counter::ray_decisions_exact})
+      hasher.mix(counters[counter]);
+    for (const auto& own : counters.named)
+      if (own.name.starts_with("ray_")) hasher.mix(own.value);
+    hashes.push_back(hasher.value());
+  }
+  return hashes;
+}
+
+TEST(Threads, HitTheSameWithRays) {
+  if (most_threads() < 7) GTEST_SKIP() << "built without TBB";
+  // One body: its rays are followed together where they can be; three bodies: nearest first.
+  std::vector<Scene<float>> scenes{sheets<float>(40, Self::with), sheets<float>(40, Self::without)};
+  scenes[0].bodies.resize(1);
+  scenes[0].pairs = {{0, 0}};
+  std::size_t tried = 0;
+  for (const StrategyEntry& entry : registry()) {
+    if (!takes_threads(entry) || !entry.info.can.rays || entry.info.topology.own) continue;
+    for (const Scene<float>& scene : scenes) {
+      if (scene.bodies.size() == 1 && !entry.info.can.self_pairs) continue;
+      ++tried;
+      const std::vector<Ray<float>> all = views(scene);
+      // Around the numbers of rays in a block, 64, and in an item of a thread, 256.
+      for (const std::size_t count : {std::size_t(0), std::size_t(256), std::size_t(257), all.size()}) {
+        const std::span<const Ray<float>> rays(all.data(), count);
+        const auto expected = ray_answers<float>(entry, scene, rays, 1, 16);
+        for (const std::uint32_t threads : {2U, 4U, 7U}) {
+          if (threads == 7 && count != all.size()) continue;
+          EXPECT_EQ(ray_answers<float>(entry, scene, rays, threads, 16), expected)
+              << entry.info.id << ", " << scene.bodies.size() << " bodies, " << count << " rays, " << threads
+              << " threads";
+        }
+      }
+    }
+  }
+  EXPECT_GE(tried, 2U);
+}
+
+TEST(Threads, HitTheSameWithRaysInDoubleAndLeavesOfOne) {
+  if (most_threads() < 4) GTEST_SKIP() << "built without TBB";
+  const Scene<double> scene = sheets<double>(40, Self::without);
+  const std::vector<Ray<double>> rays = views(scene);
+  const StrategyEntry& entry = find_strategy("bottom_up");
+  for (const std::uint32_t leaf : {1U, 4U})
+    EXPECT_EQ(ray_answers<double>(entry, scene, rays, 4, leaf),
+              ray_answers<double>(entry, scene, rays, 1, leaf))
+        << "leaves of " << leaf;
 }
 
 TEST(Threads, AreCorrectOnChangingPlansAndManyBodies) {

@@ -155,11 +155,14 @@ TEST(Allocation, NoneOnceWarmWhereChangesAreAsked) {
 
 /// Does the same for rays, at every frame.
 template <class S>
-std::string allocations_of_rays(const StrategyEntry& entry, const TestScene<S>& test) {
-  Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred});
+std::string allocations_of_rays(const StrategyEntry& entry, const TestScene<S>& test,
+                                const std::map<std::string, std::string>& params = {}, int times_each = 1) {
+  Session<S> session(test.scene, {&entry, params, entry.info.topology.preferred});
   std::vector<Ray<S>> rays;
-  for (int i = 0; i < 32; ++i)
-    rays.push_back({{S(-3), S(0.11 * i - 1.7), S(0.05 * i - 0.8)}, {S(1), S(0.3), S(0.02 * i - 0.3)}});
+  for (int i = 0; i < 32 * times_each; ++i) {
+    const double at = i % 32;
+    rays.push_back({{S(-3), S(0.11 * at - 1.7), S(0.05 * at - 0.8)}, {S(1), S(0.3), S(0.02 * at - 0.3)}});
+  }
   std::vector<RayHit> hits(rays.size());
   PhaseTimes times;
   for (int round = 0; round < 3; ++round)
@@ -185,6 +188,19 @@ TEST(Allocation, NoneOnceWarmOnSeveralThreads) {
     for (const char* const name : {"soups", "sheets", "four_bodies_own_keyframes"})
       EXPECT_EQ(allocations_when_warm(entry, synthetic_scene<float>(name, 7), {{"threads", "2"}}), "")
           << entry.info.id << " on " << name;
+  }
+}
+
+// Trees so large that threads share their builds, and enough rays for several items.
+TEST(Allocation, NoneOfBuildsAndRaysOnceWarmOnSeveralThreads) {
+  if (most_threads() < 2) GTEST_SKIP() << "one thread";
+  TestScene<float> test;
+  test.scene = grids<float>(100, 0.5, [](std::uint32_t i) { return 0.01 * (i % 7); });
+  test.frames = frame_times(test.scene, 3);
+  for (const char* const id : {"bottom_up", "lbvh", "lbvh_drift", "implicit_tree", "ploc", "binned_sah"}) {
+    const StrategyEntry& entry = find_strategy(id);
+    EXPECT_EQ(allocations_when_warm(entry, test, {{"threads", "2"}}), "") << id;
+    EXPECT_EQ(allocations_of_rays(entry, test, {{"threads", "2"}}, 64), "") << id;
   }
 }
 

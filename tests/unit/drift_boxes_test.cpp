@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <limits>
 #include <random>
 
 #include "core/families/drift/drift_probes.hpp"
@@ -12,6 +14,7 @@
 #include "core/kernels/kernel_set.hpp"
 #include "tests/support/moving_grids.hpp"
 #include "tests/support/ray_sets.hpp"
+#include "tests/support/rolled_sheet.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
 namespace kbvh::test::drift_boxes_test {
@@ -252,6 +255,101 @@ TEST(DriftBoxes, WhatMovesTogetherStaysListed) {
   int searches = 0;
   for (int f = 1; f <= 100; ++f) searches += play.frame(0.01 * f)[Counter::box_tests] != 0 ? 1 : 0;
   EXPECT_LT(searches, 12);
+}
+
+// ---- A body with itself
+
+/// Returns the gap between two boxes: the largest of all sides; at most 0 if they overlap.
+template <class S>
+double gap_between(const Box<S>& a, const Box<S>& b) {
+  double gap = -std::numeric_limits<double>::infinity();
+  for (int axis = 0; axis < 3; ++axis)
+    gap = std::max(
+        {gap, double(b.lower[axis]) - double(a.upper[axis]), double(a.lower[axis]) - double(b.upper[axis])});
+  return gap;
+}
+
+/// Lists the near pairs of a cloth with itself, and compares them with all pairs of its triangles.
+template <class S>
+void check_pairs_within(std::uint32_t width, std::uint32_t leaf_size, KernelSet kernels) {
+  SCOPED_TRACE(std::to_string(width) + ", leaves of " + std::to_string(leaf_size) + ", " + name(kernels));
+  const auto test = synthetic_scene<S>("self_rolled_cloth");
+  const Primitives& primitives = test.scene.bodies[0].primitives;
+  Playback<S> playback(test.scene);
+  playback.seek(1.5);
+  playback.evaluate_all();
+  const S* const positions = playback.positions(0);
+  const std::vector<Box<S>> boxes = primitive_boxes(primitives, positions);
+  WideHierarchy<S> tree;
+  tree.assign(
+      build_topology<S>(boxes, {.method = BuildMethod::median, .width = width, .leaf_size = leaf_size}),
+      primitives, kernels);
+  tree.refit(positions);
+  constexpr S margin = S(0.03);
+  constexpr S margins[6] = {margin, margin, margin, margin, margin, margin};
+  constexpr S reach[6] = {2 * margin, 2 * margin, 2 * margin, 2 * margin, 2 * margin, 2 * margin};
+  near_kernels<S>(kernels).widen(width)(tree.arrays(), tree.node_count(), margins, 0);
+  NearLeafRows<S> rows;
+  NearWork<S> work;
+  NearPairs<S> lists;
+  std::uint64_t tests = 0;
+  const NearSide<S> side{&tree, positions, margins, &rows, 0, &primitives};
+  lists.build(side, side, 0, 0, reach, work, tests);
+  std::size_t before = 0;
+  for (const double fraction : {0.0, 0.3, 0.7, 1.0}) {
+    PairBuffer found;
+    lists.read(fraction, found);
+    EXPECT_GT(found.size(), before) << "the scene proves nothing";
+    before = found.size();
+    std::sort(found.begin(), found.end());
+    EXPECT_EQ(std::adjacent_find(found.begin(), found.end()), found.end()) << "a pair is listed twice";
+    std::size_t wrong = 0, listed = 0;
+    for (std::uint32_t a = 0; a < primitives.count(); ++a)
+      for (std::uint32_t b = a + 1; b < primitives.count(); ++b) {
+        const bool is_listed = std::binary_search(found.begin(), found.end(), PrimitivePair{0, a, 0, b});
+        listed += is_listed ? 1 : 0;
+        const double gap = gap_between(boxes[a], boxes[b]);
+        const bool is_pair = !share_vertex(primitives[a], primitives[b]);
+        const bool must = is_pair && (gap <= 0 || gap <= 0.999 * fraction * double(reach[0]));
+        const bool may = is_pair && (gap <= 0 || (fraction > 0 && gap <= 1.001 * double(reach[0])));
+        wrong += (must && !is_listed) || (is_listed && !may) ? 1 : 0;
+      }
+    EXPECT_EQ(wrong, 0u) << "at fraction " << fraction;
+    EXPECT_EQ(listed, found.size()) << "all are canonical";
+  }
+}
+
+TEST(NearPairs, WithinABodyAreThoseInReachWithoutNeighbours) {
+  for (const KernelSet set : supported_kernel_sets())
+    for (const std::uint32_t width : {2u, 4u, 8u})
+      for (const std::uint32_t leaf_size : {1u, 3u, 16u}) {
+        check_pairs_within<float>(width, leaf_size, set);
+        check_pairs_within<double>(width, leaf_size, set);
+      }
+}
+
+TEST(DriftBoxes, ABodyThatMovesAsAWholeKeepsItsList) {
+  // Each frame moves all vertices by 0.005, and single ones by a hundredth of that.
+  const Scene<double> scene = rolled_sheet<double>(30, 2, 5, 0.05);
+  for (const char* id : {"drift_boxes", "drift_boxes_bounded"}) {
+    Play<double> play(scene, id, {{"candidates", "listed"}});  // otherwise checks of pairs count as tests
+    Play<double> refit(scene, "bottom_up", {});
+    int searches = 0;
+    std::size_t pairs = 0;
+    for (int f = 1; f <= 100; ++f) {
+      searches += play.frame(0.001 * f)[Counter::box_tests] != 0 ? 1 : 0;
+      refit.frame(0.001 * f);
+      std::sort(play.pairs.begin(), play.pairs.end());
+      std::sort(refit.pairs.begin(), refit.pairs.end());
+      EXPECT_EQ(play.pairs, refit.pairs) << id << ", frame " << f;
+      pairs += play.pairs.size();
+    }
+    EXPECT_GT(pairs, 10'000u);
+    // A bound on steps does not know that all vertices move alike.
+    if (id == std::string("drift_boxes")) {
+      EXPECT_LT(searches, 25);
+    }
+  }
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 
 #include "core/judge/verify.hpp"
 #include "tests/support/moving_grids.hpp"
+#include "tests/support/rolled_sheet.hpp"
 
 namespace kbvh::test::linear_bounds_test {
 namespace {
@@ -42,6 +43,27 @@ TEST(LinearBounds, BodiesFarApartGetOneBoxASegment) {
       EXPECT_EQ(next[Counter::bodies_skipped], 2u) << id;
       EXPECT_EQ(next[Counter::nodes_visited], 0u) << id;
     }
+}
+
+TEST(LinearBounds, ABodyWithItselfNeedsNoUpdateBetweenKeyframes) {
+  const Scene<float> scene = rolled_sheet<float>(20, 3, 0.3, 0.02);
+  for (const char* id : all_linear) {
+    Play<float> play(scene, id, {});
+    Play<float> refit(scene, "bottom_up", {});
+    std::size_t pairs = 0;
+    for (int f = 1; f <= 20; ++f) {
+      const Counters frame = play.frame(f / 10.0);
+      if (f % 10 > 1 && id != all_linear[2]) {
+        EXPECT_EQ(frame[Counter::values_written], 0u) << id << ", frame " << f;
+      }
+      refit.frame(f / 10.0);
+      std::sort(play.pairs.begin(), play.pairs.end());
+      std::sort(refit.pairs.begin(), refit.pairs.end());
+      EXPECT_EQ(play.pairs, refit.pairs) << id << ", frame " << f;
+      pairs += play.pairs.size();
+    }
+    EXPECT_GT(pairs, 1000u) << id;
+  }
 }
 
 TEST(LinearBounds, BodiesThatComeNearAgainGetAllTheirBoxes) {

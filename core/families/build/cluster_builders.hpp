@@ -19,7 +19,13 @@ class LocalClusterBuilder {
   /// `radius`, the number of neighbours searched on each side, is 8 or 16; `grain` is the number of
   /// primitives in an initial cluster.
   LocalClusterBuilder(std::uint32_t radius, std::uint32_t grain) : radius_(radius), grain_(grain) {}
-  void build(BuiltTree<S>& tree, CurveOrder<S>& order, const PrimitiveList& list);
+  /// Builds a tree over the boxes that `order` has taken: the same on any number of threads.
+  void build(Workers& workers, BuiltTree<S>& tree, CurveOrder<S>& order, const PrimitiveList& list);
+  /// Does the same on one thread.
+  void build(BuiltTree<S>& tree, CurveOrder<S>& order, const PrimitiveList& list) {
+    Workers alone;
+    build(alone, tree, order, list);
+  }
   std::size_t bytes() const;
   /// Returns the number of partner searches in all builds.
   std::uint64_t searched() const { return searched_; }
@@ -30,13 +36,32 @@ class LocalClusterBuilder {
     std::uint32_t primitives;
     float surface;
   };
+  /// A leaf of the tree: a cluster, and the place of its primitives among the entries.
+  struct Leaf {
+    std::uint32_t cluster, to;
+  };
 
  private:
-  void start(std::uint32_t count);
-  void merge_all(KernelSet kernels);
-  void match();
-  std::uint32_t merge_round();
-  float* row(std::size_t row) { return rows_.data() + row * stride_ + most_radius; }
+  /// Where the next remaining cluster goes, and the next new one; or numbers of both.
+  struct Places {
+    std::uint32_t left = 0, made = 0;
+  };
+  struct alignas(cache_line) PartPlaces {
+    Places of;
+  };
+
+  void start(Workers& workers, std::uint32_t count);
+  void merge_all(Workers& workers, KernelSet kernels);
+  void find_nearest(Workers& workers, KernelSet kernels);
+  void match(Workers& workers);
+  void merge_round(Workers& workers);
+  Places merge(std::uint32_t begin, std::uint32_t end, float* const* to_rows, std::uint32_t* to_ids,
+               Places to);
+  void write(const CurveOrder<S>& order, const Leaf& leaf, std::uint32_t* entries) const;
+  float* row(std::size_t side) { return rows_.data() + side * stride_ + most_radius; }
+  /// Cuts the active clusters into items of several threads, each of an even number.
+  Parts cut() const { return {active_, 4096}; }
+  bool shared_by(const Workers& workers) const { return workers.several() && cut().parts() > 1; }
 
   std::uint32_t radius_, grain_;
   Grains<S> grains_;
@@ -44,7 +69,13 @@ class LocalClusterBuilder {
   std::size_t stride_ = 0;
   std::uint32_t active_ = 0, made_ = 0;
   AlignedArray<float> rows_;  ///< of the active clusters, see NearestJob
-  std::vector<std::uint32_t> ids_, nearest_, partner_, parts_, open_;
+  std::vector<std::uint32_t> ids_, nearest_, partner_;
+  LayOutRoom<std::uint32_t> room_;
+  std::vector<Leaf> leaves_;
+  // Several threads cannot merge in place.
+  AlignedArray<float> next_rows_;
+  std::vector<std::uint32_t> next_ids_;
+  std::vector<PartPlaces> part_places_;
   std::uint64_t searched_ = 0;
 };
 
@@ -54,7 +85,13 @@ template <class S>
 class BinnedBuilder {
  public:
   explicit BinnedBuilder(std::uint32_t grain) : grain_(grain) {}
-  void build(BuiltTree<S>& tree, CurveOrder<S>& order, const PrimitiveList& list);
+  /// Builds a tree over the boxes that `order` has taken: the same on any number of threads.
+  void build(Workers& workers, BuiltTree<S>& tree, CurveOrder<S>& order, const PrimitiveList& list);
+  /// Does the same on one thread.
+  void build(BuiltTree<S>& tree, CurveOrder<S>& order, const PrimitiveList& list) {
+    Workers alone;
+    build(alone, tree, order, list);
+  }
   std::size_t bytes() const;
 
   /// A range of items, and their box.
@@ -62,12 +99,25 @@ class BinnedBuilder {
     std::uint32_t begin, end;
     std::array<float, 8> box;
   };
+  /// A leaf of the tree: its items, and the place of their primitives among the entries.
+  struct Leaf {
+    std::uint32_t begin, end, to;
+  };
+  /// Items sorted into bins by one thread, as in BinsJob.
+  struct alignas(cache_line) Bins {
+    float boxes[3][sah_bins][8];
+    std::uint32_t counts[3][sah_bins];
+  };
 
  private:
+  Part take_items(Workers& workers);
+
   std::uint32_t grain_;
   Grains<S> grains_;
   std::vector<std::uint32_t> items_;
-  std::vector<Part> parts_;
+  LayOutRoom<Part> room_;
+  std::vector<Leaf> leaves_;
+  std::vector<Bins> part_bins_;  ///< [part of a range]
 };
 
 extern template class LocalClusterBuilder<float>;

@@ -1,6 +1,6 @@
 #pragma once
+#include <cstddef>
 #include <cstdint>
-#include <vector>
 
 #include "core/families/build/built_tree.hpp"
 #include "core/families/build/curve_order.hpp"
@@ -19,11 +19,17 @@ struct KeyRange {
 template <class S>
 class LinearBuilder {
  public:
-  void build(BuiltTree<S>& tree, CurveOrder<S>& order, const PrimitiveList& list);
-  std::size_t bytes() const { return parts_.capacity() * sizeof(KeyRange); }
+  /// Builds a tree over the boxes that `order` has taken: the same on any number of threads.
+  void build(Workers& workers, BuiltTree<S>& tree, CurveOrder<S>& order, const PrimitiveList& list);
+  /// Does the same on one thread.
+  void build(BuiltTree<S>& tree, CurveOrder<S>& order, const PrimitiveList& list) {
+    Workers alone;
+    build(alone, tree, order, list);
+  }
+  std::size_t bytes() const { return room_.bytes(); }
 
  private:
-  std::vector<KeyRange> parts_;
+  LayOutRoom<KeyRange> room_;
 };
 
 /// A tree whose shape depends on the number of primitives only (implicit, as in Chitalu et al. 2020): the
@@ -33,7 +39,13 @@ template <class S>
 class ImplicitBuilder {
  public:
   explicit ImplicitBuilder(Curve curve) : curve_(curve) {}
-  void build(BuiltTree<S>& tree, CurveOrder<S>& order, const PrimitiveList& list);
+  /// Builds a tree over the boxes that `order` has taken: the same on any number of threads.
+  void build(Workers& workers, BuiltTree<S>& tree, CurveOrder<S>& order, const PrimitiveList& list);
+  /// Does the same on one thread.
+  void build(BuiltTree<S>& tree, CurveOrder<S>& order, const PrimitiveList& list) {
+    Workers alone;
+    build(alone, tree, order, list);
+  }
   static std::size_t bytes() { return 0; }
 
  private:

@@ -10,6 +10,8 @@ namespace {
 constexpr std::uint32_t few = 256;
 /// Up to this number of primitives, 22 bits of a code distinguish them well enough.
 constexpr std::uint32_t coarse_count = 1U << 16;
+/// Fewer primitives are sorted on one thread.
+constexpr std::uint32_t least_shared = 1U << 12;
 }  // namespace
 
 PrimitiveList::PrimitiveList(const Primitives& primitives) : count(primitives.live_count()), corners_each(0) {
@@ -30,6 +32,44 @@ void CurveOrder<S>::take(const Primitives& primitives, const PrimitiveList& list
   build_kernels<S>(kernels).primitive_boxes({primitives.offsets.data(), primitives.vertices.data(),
                                              list.corners_each, list.ids(), count_, positions, to.boxes,
                                              to.centres, to.stride, to.extent});
+}
+
+template <class S>
+void CurveOrder<S>::take(Workers& workers, const Primitives& primitives, const PrimitiveList& list,
+                         const S* positions, KernelSet kernels) {
+  if (!workers.several()) return take(primitives, list, positions, kernels);
+  const Room to = room(primitives.count(), list.count, kernels);
+  if (count_ == 0) return;
+  const Parts cut = parts();
+  if (part_extents_.size() < cut.parts()) part_extents_.resize(cut.parts());
+  workers.for_each(cut.parts(), [&](std::size_t part, std::uint32_t) {
+    const std::size_t first = cut.begin(part);
+    PrimitiveBoxesJob<S> job{primitives.offsets.data(),
+                             primitives.vertices.data(),
+                             list.corners_each,
+                             list.ids(),
+                             std::uint32_t(cut.end(part) - first),
+                             positions,
+                             to.boxes,
+                             to.centres + first,
+                             to.stride,
+                             part_extents_[part].of};
+    if (job.living != nullptr) {
+      job.living += first;
+    } else {
+      // Without a list, the kernel numbers primitives from 0.
+      job.offsets += first;
+      job.vertices += first * list.corners_each;
+      job.boxes += 8 * first;
+    }
+    build_kernels<S>(kernels).primitive_boxes(job);
+  });
+  std::copy_n(part_extents_[0].of, 8, extent_);
+  for (std::size_t part = 1; part < cut.parts(); ++part)
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      extent_[axis] = std::min(extent_[axis], part_extents_[part].of[axis]);
+      extent_[axis + 4] = std::max(extent_[axis + 4], part_extents_[part].of[axis + 4]);
+    }
 }
 
 template <class S>
@@ -57,10 +97,7 @@ CurveKeysJob<S> CurveOrder<S>::keys_job(const S* extent) {
 }
 
 template <class S>
-void CurveOrder<S>::sort(const PrimitiveList& list, Curve curve) {
-  curve_ = curve;
-  if (keys_.size() < count_) keys_.resize(count_);
-  if (count_ == 0) return;
+CurveKeysJob<S> CurveOrder<S>::keys_job(const PrimitiveList& list) {
   CurveKeysJob<S> job = keys_job(extent_);
   job.centres = centres_.data();
   job.stride = stride_;
@@ -69,6 +106,36 @@ void CurveOrder<S>::sort(const PrimitiveList& list, Curve curve) {
   job.keys = keys_.data();
   // Cells need not be much smaller than leaves, so one pass can be skipped.
   job.dropped_bits = count_ <= coarse_count ? 8 : 0;
+  return job;
+}
+
+template <class S>
+void CurveOrder<S>::sort(Workers& workers, const PrimitiveList& list, Curve curve) {
+  if (!workers.several() || count_ < least_shared) return sort(list, curve);
+  curve_ = curve;
+  if (keys_.size() < count_) keys_.resize(count_);
+  const Parts cut = parts();
+  const CurveKeysJob<S> all = keys_job(list);
+  workers.for_each(cut.parts(), [&](std::size_t part, std::uint32_t) {
+    const std::size_t first = cut.begin(part);
+    CurveKeysJob<S> job = all;
+    job.centres += first;
+    job.count = std::uint32_t(cut.end(part) - first);
+    job.keys += first;
+    if (job.living != nullptr) job.living += first;
+    build_kernels<S>(kernels_).curve_keys(job);
+    if (job.living != nullptr) return;
+    for (std::uint32_t k = 0; k < job.count; ++k) job.keys[k] += first;  // numbered from 0, as above
+  });
+  radix_.sort(workers, {keys_.data(), count_});
+}
+
+template <class S>
+void CurveOrder<S>::sort(const PrimitiveList& list, Curve curve) {
+  curve_ = curve;
+  if (keys_.size() < count_) keys_.resize(count_);
+  if (count_ == 0) return;
+  CurveKeysJob<S> job = keys_job(list);
   job.histogram = count_ <= few ? nullptr : radix_.counts();
   build_kernels<S>(kernels_).curve_keys(job);
   if (count_ <= few)
@@ -122,10 +189,30 @@ void CurveOrder<S>::refine_runs(std::uint32_t most) {
 }
 
 template <class S>
+void CurveOrder<S>::refine_runs(Workers& workers, std::uint32_t most) {
+  if (workers.several() && count_ > most) {
+    // Hardly any frame has such a run, which has two keys of one code, `most` places apart.
+    const Parts cut{count_ - most, 8192};
+    if (part_runs_.size() < cut.parts()) part_runs_.resize(cut.parts());
+    workers.for_each(cut.parts(), [&](std::size_t part, std::uint32_t) {
+      std::uint64_t runs = 0;
+      for (std::size_t i = cut.begin(part); i < cut.end(part); ++i)
+        runs += code(keys_[i]) == code(keys_[i + most]) ? 1U : 0U;
+      part_runs_[part].value = runs;
+    });
+    bool any = false;
+    for (std::size_t part = 0; part < cut.parts(); ++part) any = any || part_runs_[part].value != 0;
+    if (!any) return;
+  }
+  refine_runs(most);
+}
+
+template <class S>
 std::size_t CurveOrder<S>::bytes() const {
   return (boxes_.capacity() + centres_.capacity() + few_centres_.capacity()) * sizeof(S) +
          keys_.capacity() * sizeof(std::uint64_t) + radix_.bytes() + ids_.capacity() * sizeof(std::uint32_t) +
-         runs_.capacity() * sizeof(runs_[0]);
+         runs_.capacity() * sizeof(runs_[0]) + part_extents_.capacity() * sizeof(PartExtent) +
+         part_runs_.capacity() * sizeof(OwnCount);
 }
 
 template class CurveOrder<float>;

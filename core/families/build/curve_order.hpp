@@ -7,6 +7,7 @@
 #include "core/families/build/kernels/build_wide.hpp"
 #include "core/families/build/radix_sort.hpp"
 #include "core/families/wide/wide_tree.hpp"
+#include "core/parallel/workers.hpp"
 #include "core/scene/scene.hpp"
 
 namespace kbvh {
@@ -29,6 +30,9 @@ class CurveOrder {
  public:
   /// Computes boxes and centres of all living primitives. O(corners).
   void take(const Primitives& primitives, const PrimitiveList& list, const S* positions, KernelSet kernels);
+  /// Does the same on the threads of `workers`.
+  void take(Workers& workers, const Primitives& primitives, const PrimitiveList& list, const S* positions,
+            KernelSet kernels);
   /// Boxes and centres of all living primitives, to be written by a caller that makes boxes of its own in
   /// place of `take`: as PrimitiveBoxesJob describes them. `primitives` is the number of ids.
   struct Room {
@@ -39,6 +43,8 @@ class CurveOrder {
   Room room(std::uint32_t primitives, std::uint32_t living, KernelSet kernels);
   /// Sorts the primitives along a curve through the grid over their centres. O(primitives).
   void sort(const PrimitiveList& list, Curve curve);
+  /// Sorts to the same order on the threads of `workers`; few primitives on one.
+  void sort(Workers& workers, const PrimitiveList& list, Curve curve);
 
   std::uint32_t count() const { return count_; }
   /// Returns the boxes, [primitive][8]: lower x, y, z, unused, upper x, y, z, unused.
@@ -54,11 +60,16 @@ class CurveOrder {
   bool refine(std::uint32_t begin, std::uint32_t end);
   /// Refines all runs of more than `most` keys with one code, until the only such runs have equal centres.
   void refine_runs(std::uint32_t most);
+  /// Does the same, and looks for such runs on the threads of `workers`; refines them on one.
+  void refine_runs(Workers& workers, std::uint32_t most);
 
   std::size_t bytes() const;
 
  private:
   CurveKeysJob<S> keys_job(const S* extent);
+  CurveKeysJob<S> keys_job(const PrimitiveList& list);
+  /// Cuts the primitives into items of several threads: full rows of centres for the kernels.
+  Parts parts() const { return {count_, 4096}; }
 
   KernelSet kernels_ = KernelSet::portable;
   std::uint32_t count_ = 0;
@@ -66,6 +77,11 @@ class CurveOrder {
   AlignedArray<S> boxes_, centres_;
   std::size_t stride_ = 0;
   S extent_[8] = {};
+  struct alignas(cache_line) PartExtent {
+    S of[8];
+  };
+  std::vector<PartExtent> part_extents_;
+  std::vector<OwnCount> part_runs_;
   std::vector<std::uint64_t> keys_;
   RadixSort radix_;
   // For temporary use by `refine`.

@@ -9,15 +9,23 @@ constexpr double largest = 1e18;
 }  // namespace
 
 template <class S>
-void Grains<S>::take(const CurveOrder<S>& order, std::uint32_t size) {
+void Grains<S>::take(Workers& workers, const CurveOrder<S>& order, std::uint32_t size) {
   keys_ = order.count();
   size_ = size;
   count_ = (keys_ + size - 1) / size;
   if (boxes_.size() < std::size_t(8) * count_) boxes_.resize(std::size_t(8) * count_);
+  const Parts cut{count_, 2048};
+  workers.for_each(cut.parts(), [&](std::size_t part, std::uint32_t) {
+    fit(order, std::uint32_t(cut.begin(part)), std::uint32_t(cut.end(part)));
+  });
+}
+
+template <class S>
+void Grains<S>::fit(const CurveOrder<S>& order, std::uint32_t begin_grain, std::uint32_t end_grain) {
   const auto keys = order.keys();
   const S* const from = order.boxes();
-  std::uint32_t k = 0;
-  for (std::uint32_t grain = 0; grain < count_; ++grain) {
+  std::uint32_t k = begin_grain * size_;
+  for (std::uint32_t grain = begin_grain; grain < end_grain; ++grain) {
     float* const box = boxes_.data() + std::size_t(8) * grain;
     const std::uint32_t end = k + primitives(grain);
     S lower[3], upper[3];

@@ -12,8 +12,8 @@ namespace kbvh {
 template <class S>
 class Grains {
  public:
-  /// Cuts the sorted primitives of an order into runs of `size`.
-  void take(const CurveOrder<S>& order, std::uint32_t size);
+  /// Cuts the sorted primitives of an order into runs of `size`, on the threads of `workers`.
+  void take(Workers& workers, const CurveOrder<S>& order, std::uint32_t size);
   std::uint32_t count() const { return count_; }
   std::uint32_t size() const { return size_; }
   /// Returns the boxes, [grain][8]: lower x, y, z, 0, upper x, y, z, 0.
@@ -30,6 +30,9 @@ class Grains {
   std::size_t bytes() const { return boxes_.capacity() * sizeof(float); }
 
  private:
+  /// Computes the boxes of the grains [begin_grain, end_grain).
+  void fit(const CurveOrder<S>& order, std::uint32_t begin_grain, std::uint32_t end_grain);
+
   std::uint32_t count_ = 0, size_ = 1, keys_ = 0;
   AlignedArray<float> boxes_;
 };

@@ -57,21 +57,33 @@ void NearPairs<S>::build(const NearSide<S>& a, const NearSide<S>& b, std::uint32
                    0,
                    0};
   for (std::size_t k = 0; k < 6; ++k) near.inverse_reach[k] = 1 / reach[k];
-  const auto traverse = wide_overlap_kernels<S>(hierarchy_a.kernels()).traverse(width);
+  const bool self = body_a == body_b;
+  const auto& overlaps = wide_overlap_kernels<S>(hierarchy_a.kernels());
+  const auto traverse = self ? overlaps.self(width) : overlaps.traverse(width);
   const auto pairs_of_leaves =
       near_kernels<S>(hierarchy_a.kernels())
           .near(width,
                 std::max(4u, std::max(hierarchy_a.padded_leaf_size(), hierarchy_b.padded_leaf_size())));
-  while (state.depth > 0) {
-    traverse(near.a, near.b, state);
+  // Turns the first pairs of leaves into pairs of primitives.
+  const auto take = [&](std::size_t count, LeavesOf leaves) {
+    const std::size_t before = near.found;
     near.next = 0;
-    near.count = state.found;
+    near.count = count;
     while (near.next < near.count) {
       if (work.found.size() < near.found + chunk_room) work.found.resize(2 * near.found + chunk_room);
       near.out = work.found.data();
       near.out_room = work.found.size();
       pairs_of_leaves(near);
     }
+    if (self)
+      near.found =
+          before + keep_self_pairs(a.neighbours, leaves, work.found.data() + before, near.found - before);
+  };
+  work.own_leaves.clear();
+  while (state.depth > 0) {
+    traverse(near.a, near.b, state);
+    take(self ? take_out_own_leaves(work.leaf_pairs.data(), state.found, work.own_leaves) : state.found,
+         LeavesOf::two);
     state.found = 0;
     if (state.depth + max_pairs_per_step >= state.stack_room) {
       work.stack.resize(2 * work.stack.size());
@@ -79,6 +91,8 @@ void NearPairs<S>::build(const NearSide<S>& a, const NearSide<S>& b, std::uint32
       state.stack_room = work.stack.size();
     }
   }
+  for_own_leaves(work.own_leaves, work.leaf_pairs.data(), leaf_pair_room,
+                 [&](std::size_t count) { take(count, LeavesOf::one); });
   tests += state.tests + near.tests;
   sort({work.found.data(), near.found}, body_a, body_b);
 }

@@ -7,6 +7,7 @@
 #include "core/families/drift/kernels/near_pairs.hpp"
 #include "core/families/wide/wide_hierarchy.hpp"
 #include "core/scene/pairs.hpp"
+#include "core/scene/self_pairs.hpp"
 
 namespace kbvh {
 
@@ -35,10 +36,11 @@ template <class S>
 struct NearWork {
   std::vector<WidePair> stack;
   std::vector<LeafSlot> leaf_pairs;
+  std::vector<LeafSlot> own_leaves;  ///< of a body with itself: found with themselves, and not taken yet
   std::vector<NearPair> found;
   std::vector<FoundPair> chunk;
   std::size_t bytes() const {
-    return stack.size() * sizeof(WidePair) + leaf_pairs.size() * sizeof(LeafSlot) +
+    return stack.size() * sizeof(WidePair) + (leaf_pairs.size() + own_leaves.capacity()) * sizeof(LeafSlot) +
            found.capacity() * sizeof(NearPair) + chunk.capacity() * sizeof(FoundPair);
   }
 };
@@ -52,12 +54,14 @@ struct NearSide {
   const S* margin;
   NearLeafRows<S>* rows;  ///< rows of these positions, as far as they exist
   S rounding = 0;         ///< additional error of a vertex, relative to its coordinate
+  /// The primitives, for a body with itself: those that share a vertex are not listed. Null: they are.
+  const Primitives* neighbours = nullptr;
 };
 
 /// The pairs of primitives of two bodies whose boxes can meet while the bodies close in on each other by no
 /// more than a reach, in order of the closing at which they first can meet. For slow motion one list contains
 /// the candidates of many frames, and each frame reads a prefix in proportion to the motion (neighbour lists,
-/// Verlet 1967, for boxes).
+/// Verlet 1967, for boxes). Both bodies may be the same one, whose vertices then close in on each other.
 ///
 /// Closing is measured by side: the possible loss of the gap between a and b if b lies above a along x, y, z
 /// (0 to 2), or below it (3 to 5).
@@ -66,7 +70,8 @@ class NearPairs {
  public:
   /// Searches from scratch. The reach per side is the sum of both margins and must be positive. Adds the box
   /// tests made to `tests`. Allocates only if there are more pairs than ever before. Both hierarchies need
-  /// the same width and leaf size and must not be empty.
+  /// the same width and leaf size and must not be empty. For a body with itself, both sides are the same;
+  /// each pair is listed once, canonical.
   void build(const NearSide<S>& a, const NearSide<S>& b, std::uint32_t body_a, std::uint32_t body_b,
              const S (&reach)[6], NearWork<S>& work, std::uint64_t& tests);
   void clear();

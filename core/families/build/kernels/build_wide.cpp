@@ -182,8 +182,8 @@ void leaf_rows(const LeafRowsJob<S>& shared) {
 }
 
 template <class S>
-void nodes(WideArrays<S> h, const S* leaf_boxes, std::uint32_t count) {
-  for (std::uint32_t n = count; n-- > 0;) {
+void nodes(WideArrays<S> h, const S* leaf_boxes, std::uint32_t begin, std::uint32_t end) {
+  for (std::uint32_t n = end; n-- > begin;) {
     const WideNode node = h.nodes[n];
     const S* boxes[8];
     for (std::uint32_t lane = 0; lane < 8; ++lane)

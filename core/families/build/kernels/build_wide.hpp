@@ -65,9 +65,9 @@ struct BuildKernels {
   void (*curve_keys)(const CurveKeysJob<S>& job);
   /// [padded leaf size 1, 4, 8, 16]
   void (*leaf_rows[4])(const LeafRowsJob<S>& job);
-  /// Computes the boxes of the 8-wide nodes [0, count) of a hierarchy in which parents have smaller numbers
-  /// than their children.
-  void (*nodes)(WideArrays<S> hierarchy, const S* leaf_boxes, std::uint32_t count);
+  /// Computes the boxes of the 8-wide nodes [begin, end) of a hierarchy in which parents have smaller numbers
+  /// than their children; those of other children are current.
+  void (*nodes)(WideArrays<S> hierarchy, const S* leaf_boxes, std::uint32_t begin, std::uint32_t end);
 };
 KBVH_DECLARE_KERNELS(BuildKernels<float>, build_float)
 KBVH_DECLARE_KERNELS(BuildKernels<double>, build_double)
