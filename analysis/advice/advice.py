@@ -328,14 +328,18 @@ def _title(row: pd.Series) -> str:
     return f"{words(row['scene_name'])}, {text.size(row['primitives'])}, l = {row['l']:g}{scalar}"
 
 
+def _changes(one: Situation) -> list[tuple[str, Advice]]:
+    """Returns what is known and what to take then, without advice that more knowledge does not change."""
+    found: list[tuple[str, Advice]] = []
+    for known, best in one.advice:
+        if best is not None and (not found or best.id != found[-1][1].id):
+            found.append((known, best))
+    return found
+
+
 def sentence(one: Situation) -> str:
     """Writes the advice of a situation in one sentence; advice that more knowledge does not change is not repeated."""
-    parts: list[str] = []
-    last = ""
-    for known, best in one.advice:
-        if best is not None and best.id != last:
-            parts.append(f"{best.title} {'if' if parts else 'where'} {known}: {best.says}, at {best.costs}")
-            last = best.id
+    parts = [f"{best.title} {'if' if i else 'where'} {known}: {best.says}, at {best.costs}" for i, (known, best) in enumerate(_changes(one))]
     asks = {PAIRS: "", SELF: " and pairs within a body"}.get(one.asks, f" and {one.asks}")
     begin = f"With {said_of(one.frames)}{asks}"
     return f"{begin}, take {'; '.join(parts)}." if parts else f"{begin}, no strategy was measured in half of the cells."
@@ -343,10 +347,5 @@ def sentence(one: Situation) -> str:
 
 def brief(one: Situation) -> str:
     """Writes the advice of a situation shorter, for measurements that are quoted: titles and times."""
-    parts: list[str] = []
-    last = ""
-    for known, best in one.advice:
-        if best is not None and best.id != last:
-            parts.append(f"{best.title}{f' if {known}' if parts else ''}, {best.costs}")
-            last = best.id
+    parts = [f"{best.title}{f' if {known}' if i else ''}, {best.costs}" for i, (known, best) in enumerate(_changes(one))]
     return f"{said_of(one.frames)}: {'; '.join(parts)}"

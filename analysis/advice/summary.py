@@ -33,9 +33,8 @@ class Verdict:
     row: paper_claims.Row  #: of this study
     reference: str  #: the verdict of the reference run, "" if it has none
     reference_brief: str = ""
-    reference_corners: list[tuple[str, str]] = field(default_factory=list)
-    reference_judged: list[dict[str, Any]] = field(default_factory=list)  #: the corners as claims.json has them
-    reference_ours: dict[str, str] = field(default_factory=dict)
+    reference_corners: list[dict[str, Any]] = field(default_factory=list)  #: as claims.json has them
+    reference_ours: dict[str, str] = field(default_factory=dict)  #: the measured ranges, by corner
 
     @property
     def source(self) -> str:
@@ -51,17 +50,19 @@ class Verdict:
         return self.row.brief if self.source != BY_REFERENCE else self.reference_brief
 
     @property
-    def corners(self) -> list[tuple[str, str]]:
-        """Returns the corners of the claim's square, each with the range that was measured, without motion evaluation."""
-        return _ranges([asdict(one) for one in self.row.corners], self.row.ours) if self.source == HERE else self.reference_corners
+    def corners(self) -> list[dict[str, Any]]:
+        """Returns the corners of the claim's square, as claims.json has them."""
+        return self.reference_corners if self.source == BY_REFERENCE else [asdict(one) for one in self.row.corners]
+
+    @property
+    def ours(self) -> dict[str, str]:
+        """Returns the ranges that were measured, by corner, as `claims.ours` writes them."""
+        return self.reference_ours if self.source == BY_REFERENCE else self.row.ours
 
     @property
     def judged(self) -> list[tuple[str, str, str]]:
-        """Returns the id of each corner, the range that was measured without motion evaluation, and where it is met."""
-        known = self.source == BY_REFERENCE
-        corners = self.reference_judged if known else [asdict(one) for one in self.row.corners]
-        ours = self.reference_ours if known else self.row.ours
-        return [(one["id"], ours[one["id"]].split(",")[0], str(one.get("rule", ""))) for one in corners if one["id"] in ours]
+        """Returns the id of each corner of a claim with one check, the range without motion evaluation, and where it is met."""
+        return [(one["id"], self.ours[one["id"]].split(",")[0], str(one.get("rule", ""))) for one in self.corners if one["id"] in self.ours]
 
     @property
     def differs(self) -> bool:
@@ -99,13 +100,8 @@ def paper(claims: Claims, folder: Path, reference: Path = REFERENCE) -> Paper:
     verdicts = []
     for row in claims.rows:
         one = known.get(row.id, {})
-        corners = _ranges(one.get("corners", []), one.get("ours", {}))
-        verdicts.append(Verdict(row, one.get("verdict", ""), one.get("brief", ""), corners, one.get("corners", []), one.get("ours", {})))
+        verdicts.append(Verdict(row, one.get("verdict", ""), one.get("brief", ""), one.get("corners", []), one.get("ours", {})))
     return Paper(verdicts, about)
-
-
-def _ranges(corners: Sequence[dict[str, Any]], ours: dict[str, str]) -> list[tuple[str, str]]:
-    return [(one["name"], ours[one["id"]].split(",")[0]) for one in corners if one["id"] in ours]
 
 
 #: The corners that the question of MAIN is answered in: the refit, the tree, and how a condition names both.

@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Optional
@@ -253,6 +254,26 @@ def ours(looked: list[CheckResult]) -> dict[str, str]:
             name = one.check.get("short", "")
             result.setdefault(corner, []).append((f"{name}: " if name else "") + ", ".join(parts))
     return {corner: "; ".join(parts) for corner, parts in result.items()}
+
+
+def ranges_of_corners(corners: Sequence[dict[str, Any]], ours: dict[str, str]) -> list[list[str]]:
+    """Returns a claim's corners as [name, range without motion evaluation, verdict].
+
+    `ours` is what the function of that name returns: the ranges of a corner by its id, one for each check that has the corner, as in
+    "kinetic AABB tree: 0.1 to 0.5; kinetic BoxTree: 0.2 to 0.7". A claim with several checks names the check of each corner.
+    """
+    several = len({one["check"] for one in corners}) > 1
+    seen: dict[str, int] = {}
+    found = []
+    for one in corners:
+        at = seen[one["id"]] = seen.get(one["id"], -1) + 1
+        parts = ours.get(one["id"], "").split("; ")
+        if at >= len(parts) or not parts[at]:
+            continue
+        label, _, span = parts[at].rpartition(": ")
+        name = f"{label}: {one['name']}" if several and label and label != one["name"].removeprefix("the ") else one["name"]
+        found.append([name, span.split(",")[0], one["verdict"]])
+    return found
 
 
 def _range(values: list[float]) -> str:

@@ -9,8 +9,6 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Optional
 
@@ -294,38 +292,10 @@ def _claims(known: Optional[summary.Paper]) -> list[dict[str, Any]]:
     """Returns the claims of the paper, experiments first, each with its verdict, whose it is, its ranges and its picture of these results."""
     if known is None:
         return []
-    file = summary.REFERENCE / "claims.json"
-    kept = {one["id"]: one for one in json.loads(file.read_text(encoding="utf-8"))["claims"]} if file.exists() else {}
-
-    def ranges(one: summary.Verdict) -> list[list[str]]:
-        if one.source == summary.HERE:
-            return corners([asdict(corner) for corner in one.row.corners], one.row.ours)
-        return corners(kept[one.row.id]["corners"], kept[one.row.id]["ours"]) if one.row.id in kept else []
-
     found = [
         {"id": one.row.id, "claim": one.row.claim, "paper": one.row.paper, "verdict": one.verdict, "source": one.source, "brief": one.brief,
-         "corners": ranges(one),
+         "corners": paper_claims.ranges_of_corners(one.corners, one.ours),
          "picture": str(claim_pictures.picture(one.row.looked, one.row.checks)) if one.source == summary.HERE else ""}
         for one in known.verdicts if one.source
     ]  # fmt: skip
     return sorted(found, key=lambda one: not one["id"].startswith("E"))
-
-
-def corners(listed: Sequence[dict[str, Any]], ours: dict[str, str]) -> list[list[str]]:
-    """Returns a claim's corners as [name, range without motion evaluation, verdict].
-
-    `ours` has the ranges of a corner by its id: one for each check that has the corner, as in "kinetic AABB tree: 0.1 to 0.5; kinetic
-    BoxTree: 0.2 to 0.7". A claim with several checks names the check of each corner.
-    """
-    several = len({one["check"] for one in listed}) > 1
-    seen: dict[str, int] = {}
-    found = []
-    for one in listed:
-        at = seen[one["id"]] = seen.get(one["id"], -1) + 1
-        parts = ours.get(one["id"], "").split("; ")
-        if at >= len(parts) or not parts[at]:
-            continue
-        label, _, span = parts[at].rpartition(": ")
-        name = f"{label}: {one['name']}" if several and label and label != one["name"].removeprefix("the ") else one["name"]
-        found.append([name, span.split(",")[0], one["verdict"]])
-    return found

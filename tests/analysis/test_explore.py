@@ -17,6 +17,7 @@ from unittest import mock
 import paths  # noqa: F401  (finds the modules under test)
 import synthetic
 
+from claims import claims
 from explorer import explore, explorer_data
 from figures import colours
 from results import clip_times, load
@@ -166,9 +167,9 @@ class TestData(Folder):
         listed = [{"check": check, "id": id, "name": name, "verdict": "holds"}
                   for check, id, name in (("trees", "a", "as then"), ("trees", "b", "best"), ("boxes", "a", "as then"))]  # fmt: skip
         ours = {"a": "trees: 0.1 to 0.5, 0.2 to 0.6 (with motion); boxes: 2 to 3, 4 (with motion)", "b": "trees: 7"}
-        self.assertEqual(explorer_data.corners(listed, ours),
+        self.assertEqual(claims.ranges_of_corners(listed, ours),
                          [["trees: as then", "0.1 to 0.5", "holds"], ["trees: best", "7", "holds"], ["boxes: as then", "2 to 3", "holds"]])  # fmt: skip
-        self.assertEqual(explorer_data.corners(listed[:2], {"a": "0.1 to 0.5, 1 (with motion)"}), [["as then", "0.1 to 0.5", "holds"]])
+        self.assertEqual(claims.ranges_of_corners(listed[:2], {"a": "0.1 to 0.5, 1 (with motion)"}), [["as then", "0.1 to 0.5", "holds"]])
 
     def test_is_json_without_nan(self) -> None:
         hidden = line("bottom_up", [1.0])
