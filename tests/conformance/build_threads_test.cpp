@@ -14,39 +14,17 @@
 #include "core/families/build/curve_builders.hpp"
 #include "core/families/build/radix_sort.hpp"
 #include "core/parallel/workers.hpp"
-#include "tests/support/random.hpp"
+#include "tests/support/builder_inputs.hpp"
 
 namespace kbvh::test::build_threads {
 namespace {
 
-/// Primitives and the positions of their vertices, one scalar past the end.
 template <class S>
-struct Input {
-  std::string name;
-  Primitives primitives;
-  std::vector<S> positions;
+using Input = BuilderInput<S>;
 
-  void add(std::initializer_list<std::array<double, 3>> corners) {
-    std::vector<std::uint32_t> ids;
-    for (const auto& corner : corners) {
-      ids.push_back(std::uint32_t(positions.size() / 3));
-      for (const double x : corner) positions.push_back(S(x));
-    }
-    primitives.add(ids);
-  }
-};
-
-/// Small triangles at random places in a box of the given lengths.
 template <class S>
 Input<S> soup(const char* name, std::uint32_t count, double x, double y, double z) {
-  Input<S> input{name, {}, {}};
-  Random random(count);
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const double at[3] = {x * random.unit(), y * random.unit(), z * random.unit()};
-    const auto near = [&](int axis) { return at[axis] + 0.01 * random.unit(); };
-    input.add({{near(0), near(1), near(2)}, {near(0), near(1), near(2)}, {near(0), near(1), near(2)}});
-  }
-  return input;
+  return random_triangles<S>(name, count, x, y, z, count);
 }
 
 /// Sizes around the limits of the parts that threads take: 4,096 primitives, 8,192 keys, and 16,384 items to
