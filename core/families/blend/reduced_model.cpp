@@ -125,10 +125,15 @@ ReducedModel<S>::ReducedModel(const FlightPlans<S>& plans, const Settings& setti
   const std::size_t n = snapshots.keyframes();
   const std::vector<double> gram = gram_matrix(snapshots);
   const auto size = Eigen::Index(n);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
-      Eigen::Map<const Eigen::MatrixXd>(gram.data(), size, size));
+  // long double: Eigen has no packets for it, so that every compiler sums in the same order, and modes and
+  // counts are equal in all builds.
+  using Matrix = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
+  const Eigen::SelfAdjointEigenSolver<Matrix> eigen(
+      Eigen::Map<const Eigen::MatrixXd>(gram.data(), size, size).cast<long double>());
   const bool decomposed = eigen.info() == Eigen::Success;  // else without modes: the remainder is everything
-  const auto variance = [&](std::size_t mode) { return eigen.eigenvalues()[size - 1 - Eigen::Index(mode)]; };
+  const auto variance = [&](std::size_t mode) {
+    return double(eigen.eigenvalues()[size - 1 - Eigen::Index(mode)]);
+  };
   double tail = 0;
   for (std::size_t m = 0; decomposed && m < n; ++m) tail += std::max(variance(m), 0.0);
   const double enough = settings.tolerance * settings.tolerance * double(n) * double(vertices);
@@ -141,7 +146,7 @@ ReducedModel<S>::ReducedModel(const FlightPlans<S>& plans, const Settings& setti
   for (std::size_t m = 0; m < mode_count; ++m)
     for (std::size_t k = 0; k < n; ++k)
       factors[k * mode_count + m] =
-          eigen.eigenvectors()(Eigen::Index(k), size - 1 - Eigen::Index(m)) / std::sqrt(variance(m));
+          double(eigen.eigenvectors()(Eigen::Index(k), size - 1 - Eigen::Index(m))) / std::sqrt(variance(m));
   std::vector<double> sums(mode_count);
   snapshots.for_blocks([&](std::size_t first, std::size_t many, const double* values) {
     for (std::size_t i = 0; i < many; ++i) {
