@@ -12,7 +12,7 @@ namespace kbvh {
 namespace {
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
-/// If fewer than one in this many clusters is the first of a mutual choice, the round merges others, too.
+/// If a round merges fewer than one pair in this many clusters, the next one merges others, too.
 constexpr std::uint32_t least_share = 16;
 
 /// Lets a binary tree of clusters be laid out. Leaves are listed, and their primitives written afterwards.
@@ -88,7 +88,6 @@ void LocalClusterBuilder<S>::start(Workers& workers, std::uint32_t count) {
   grow(clusters_, 2 * std::size_t(count));
   grow(ids_, count);
   grow(nearest_, count);
-  grow(partner_, count);
   grow(part_places_, cut().parts());
   stride_ = (std::size_t(count) + 2 * most_radius + 15) / 16 * 16;
   grow(rows_, 6 * stride_);
@@ -120,11 +119,15 @@ void LocalClusterBuilder<S>::start(Workers& workers, std::uint32_t count) {
 
 template <class S>
 void LocalClusterBuilder<S>::merge_all(Workers& workers, KernelSet kernels) {
+  bool few_merged = false;
   while (active_ > 1) {
     find_nearest(workers, kernels);
     searched_ += active_;
-    match(workers);
+    if (few_merged) match_others();
+    const std::uint32_t before = active_;
     merge_round(workers);
+    KBVH_ASSERT(active_ < before || !few_merged);
+    few_merged = std::uint64_t(before - active_) * least_share < before;
     for (std::size_t side = 0; side < 6; ++side) std::fill_n(row(side) + active_, most_radius, -infinity);
   }
 }
@@ -142,35 +145,21 @@ void LocalClusterBuilder<S>::find_nearest(Workers& workers, KernelSet kernels) {
   });
 }
 
-/// Chooses which clusters merge: those that chose each other. Where sizes grow along the curve, each cluster
-/// chooses a smaller one, and hardly any two choose each other; then a cluster also merges with its choice if
-/// that is still free. At most 2 * radius clusters choose the same one, so every round merges a fixed share
-/// of all clusters.
+/// Clusters merge that chose each other. Where sizes grow along the curve, each chooses a smaller one, and
+/// hardly any two choose each other, and where surfaces are equal, sometimes none; then a cluster also merges
+/// with its choice if that is still free: from here on they count as having chosen each other. At most 2 *
+/// radius clusters choose the same one, so this merges a fixed share of all clusters, and at least every
+/// other round does.
 template <class S>
-void LocalClusterBuilder<S>::match(Workers& workers) {
-  const Parts parts = cut();
-  workers.for_each(parts.parts(), [&](std::size_t part, std::uint32_t) {
-    std::uint32_t in_part = 0;
-    for (auto i = std::uint32_t(parts.begin(part)); i < parts.end(part); ++i) {
-      const std::uint32_t other = nearest_[i];
-      const bool mutual = nearest_[other] == i;
-      partner_[i] = mutual ? other : i;
-      in_part += mutual ? 1 : 0;
-    }
-    part_places_[part].of.made = in_part;
-  });
-  std::uint32_t matched = 0;
-  for (std::size_t part = 0; part < parts.parts(); ++part) matched += part_places_[part].of.made;
-  if (matched / 2 * least_share >= active_) return;
+void LocalClusterBuilder<S>::match_others() {
   for (std::uint32_t i = 0; i < active_; ++i) {
     const std::uint32_t other = nearest_[i];
-    if (partner_[i] != i || partner_[other] != other) continue;
-    partner_[i] = other;
-    partner_[other] = i;
+    if (nearest_[other] == i || nearest_[nearest_[other]] == other) continue;
+    nearest_[other] = i;
   }
 }
 
-/// Merges all clusters with their partners.
+/// Merges all clusters that chose each other.
 template <class S>
 void LocalClusterBuilder<S>::merge_round(Workers& workers) {
   float* to[6];
@@ -183,8 +172,10 @@ void LocalClusterBuilder<S>::merge_round(Workers& workers) {
     workers.for_each(parts.parts(), [&](std::size_t part, std::uint32_t) {
       Places in_part;
       for (auto i = std::uint32_t(parts.begin(part)); i < parts.end(part); ++i) {
-        in_part.left += partner_[i] >= i ? 1U : 0U;
-        in_part.made += partner_[i] > i ? 1U : 0U;
+        const std::uint32_t other = nearest_[i];
+        const bool mutual = nearest_[other] == i;
+        in_part.left += mutual && other < i ? 0U : 1U;
+        in_part.made += mutual && other > i ? 1U : 0U;
       }
       part_places_[part].of = in_part;
     });
@@ -201,14 +192,13 @@ void LocalClusterBuilder<S>::merge_round(Workers& workers) {
     rows_.swap(next_rows_);
     ids_.swap(next_ids_);
   }
-  KBVH_ASSERT(next.left < active_);
   active_ = next.left;
   made_ = next.made;
 }
 
-/// Merges the clusters [begin, end) with their partners: writes the rows and ids of those that remain, and
-/// the new clusters, from the given places on; returns the places after them. The rows and ids may be the
-/// current ones if all clusters are merged at once.
+/// Merges those of the clusters [begin, end) that chose each other: writes the rows and ids of those that
+/// remain, and the new clusters, from the given places on; returns the places after them. The rows and ids
+/// may be the current ones if all clusters are merged at once.
 template <class S>
 auto LocalClusterBuilder<S>::merge(std::uint32_t begin, std::uint32_t end, float* const* to_rows,
                                    std::uint32_t* to_ids, Places to) -> Places {
@@ -217,9 +207,10 @@ auto LocalClusterBuilder<S>::merge(std::uint32_t begin, std::uint32_t end, float
     rows[side] = row(side);
     targets[side] = to_rows[side];
   }
-  const std::uint32_t* const ids = ids_.data();
+  const std::uint32_t *const ids = ids_.data(), *const nearest = nearest_.data();
   for (std::uint32_t i = begin; i < end; ++i) {
-    const std::uint32_t other = partner_[i];
+    const bool mutual = nearest[nearest[i]] == i;
+    const std::uint32_t other = mutual ? nearest[i] : i;
     if (other < i) continue;
     float box[6];
     for (std::size_t side = 0; side < 6; ++side) {
@@ -243,8 +234,7 @@ template <class S>
 std::size_t LocalClusterBuilder<S>::bytes() const {
   return grains_.bytes() + clusters_.capacity() * sizeof(Cluster) +
          (rows_.capacity() + next_rows_.capacity()) * sizeof(float) +
-         (ids_.capacity() + next_ids_.capacity() + nearest_.capacity() + partner_.capacity()) *
-             sizeof(std::uint32_t) +
+         (ids_.capacity() + next_ids_.capacity() + nearest_.capacity()) * sizeof(std::uint32_t) +
          room_.bytes() + leaves_.capacity() * sizeof(Leaf) + part_places_.capacity() * sizeof(PartPlaces);
 }
 

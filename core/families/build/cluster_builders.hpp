@@ -53,7 +53,7 @@ class LocalClusterBuilder {
   void start(Workers& workers, std::uint32_t count);
   void merge_all(Workers& workers, KernelSet kernels);
   void find_nearest(Workers& workers, KernelSet kernels);
-  void match(Workers& workers);
+  void match_others();
   void merge_round(Workers& workers);
   Places merge(std::uint32_t begin, std::uint32_t end, float* const* to_rows, std::uint32_t* to_ids,
                Places to);
@@ -69,7 +69,7 @@ class LocalClusterBuilder {
   std::size_t stride_ = 0;
   std::uint32_t active_ = 0, made_ = 0;
   AlignedArray<float> rows_;  ///< of the active clusters, see NearestJob
-  std::vector<std::uint32_t> ids_, nearest_, partner_;
+  std::vector<std::uint32_t> ids_, nearest_;
   LayOutRoom<std::uint32_t> room_;
   std::vector<Leaf> leaves_;
   // Several threads cannot merge in place.
