@@ -1,6 +1,6 @@
 #pragma once
 #include <algorithm>
-#include <boost/multiprecision/cpp_int.hpp>
+#include <boost/multiprecision/gmp.hpp>
 #include <cmath>
 #include <vector>
 
@@ -11,7 +11,8 @@
 
 namespace kbvh::test {
 
-using Rational = boost::multiprecision::cpp_rational;
+using Rational =
+    boost::multiprecision::number<boost::multiprecision::gmp_rational, boost::multiprecision::et_off>;
 
 /// Coefficients, [0] of s^0; without leading zeros, empty: zero.
 using RationalPolynomial = std::vector<Rational>;

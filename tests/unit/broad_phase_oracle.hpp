@@ -3,7 +3,7 @@
 // rationals, distances in rationals.
 #include <algorithm>
 #include <array>
-#include <boost/multiprecision/cpp_int.hpp>
+#include <boost/multiprecision/gmp.hpp>
 #include <cmath>
 #include <exception>
 #include <limits>
@@ -16,7 +16,8 @@
 
 namespace kbvh::test::broad_phase {
 
-using Rational = boost::multiprecision::cpp_rational;
+using Rational =
+    boost::multiprecision::number<boost::multiprecision::gmp_rational, boost::multiprecision::et_off>;
 using Pairs = std::set<Candidate>;
 
 /// A mesh with positions at one time or two, row by row.

@@ -252,10 +252,10 @@ void check_random(int count, std::uint64_t seed) {
 }
 
 TEST(CurveRoots, EqualRationalArithmeticOnRandomPairsOfFloats) {
-  check_random<float>(testing_support::slow() ? 1000000 : 60000, 1);
+  check_random<float>(testing_support::slow() ? 1000000 : 100000, 1);
 }
 TEST(CurveRoots, EqualRationalArithmeticOnRandomPairsOfDoubles) {
-  check_random<double>(testing_support::slow() ? 1000000 : 40000, 2);
+  check_random<double>(testing_support::slow() ? 1000000 : 100000, 2);
 }
 
 template <class S>
@@ -279,10 +279,10 @@ void check_adversarial(int count, std::uint64_t seed) {
 }
 
 TEST(CurveRoots, EqualRationalArithmeticOnAdversarialPairsOfFloats) {
-  check_adversarial<float>(700, 3);
+  check_adversarial<float>(1000, 3);
 }
 TEST(CurveRoots, EqualRationalArithmeticOnAdversarialPairsOfDoubles) {
-  check_adversarial<double>(400, 4);
+  check_adversarial<double>(1000, 4);
 }
 
 template <class S>
