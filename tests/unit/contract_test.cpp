@@ -311,9 +311,8 @@ TEST(Contract, StrategiesSayWhetherTheyFollowCurves) {
     if (entry.info.foresight <= Foresight::step_bound) {
       EXPECT_TRUE(entry.info.can.curves) << entry.info.id;
     }
-  for (const char* id :
-       {"kinetic_aabb", "kinetic_boxtree", "kinetic_envelope", "kinetic_kdop", "kinetic_separation_list",
-        "linear_bounds"})
+  for (const char* id : {"kinetic_aabb", "kinetic_boxtree", "kinetic_envelope", "kinetic_kdop",
+                         "kinetic_separation_list", "linear_bounds"})
     EXPECT_TRUE(find_strategy(id).info.can.curves) << id;
   EXPECT_FALSE(find_strategy("interval_join").info.can.curves);
 }

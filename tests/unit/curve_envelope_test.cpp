@@ -60,21 +60,33 @@ SegmentCurves<S> curves_in(const FlightPlans<S>& plans, std::size_t k) {
           plans.twists(k)};
 }
 
-/// Returns the number of sides whose realiser is not extremal at t.
+/// Returns the rank of each place at t among those of the same axis.
 template <class S>
-std::uint64_t not_extremal(const Sides<S>& sides, const SegmentCurves<S>& curves,
-                           const WideRealisers& realisers, std::size_t places, double t) {
-  std::vector<Rational> values;
-  for (std::uint32_t place = 0; place < places; ++place)
-    values.push_back(rational_value(curves.piece(place), Rational(t)));
+std::vector<std::uint32_t> ranks_at(const SegmentCurves<S>& curves, std::size_t places, double t) {
+  std::vector<std::uint32_t> result(places);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::vector<Rational> values;
+    for (std::size_t place = axis; place < places; place += 3)
+      values.push_back(rational_value(curves.piece(std::uint32_t(place)), Rational(t)));
+    const std::vector<std::uint32_t> rank = ranks(values);
+    for (std::size_t i = 0; i < rank.size(); ++i) result[3 * i + axis] = rank[i];
+  }
+  return result;
+}
+
+/// Returns the number of sides whose realiser is not extremal.
+template <class S>
+std::uint64_t not_extremal(const Sides<S>& sides, const std::vector<std::uint32_t>& rank,
+                           const WideRealisers& realisers) {
   std::uint64_t found = 0;
-  for (std::size_t slot = 0; slot < sides.below.size(); ++slot)
-    for (const std::uint32_t place : sides.below[slot]) {
-      const int ahead = values[place].compare(values[realisers[slot]]);
-      if (sides.is_lower(slot) ? ahead >= 0 : ahead <= 0) continue;
-      ++found;
-      break;
-    }
+  for (std::size_t slot = 0; slot < sides.below.size(); ++slot) {
+    const std::vector<std::uint32_t>& below = sides.below[slot];
+    const bool lower = sides.is_lower(slot);
+    found += std::any_of(below.begin(), below.end(), [&](std::uint32_t place) {
+      const std::uint32_t realised = rank[realisers[slot]];
+      return lower ? rank[place] < realised : rank[place] > realised;
+    });
+  }
   return found;
 }
 
@@ -117,7 +129,8 @@ Findings play(const Scene<S>& scene, const BuilderConfig& builder, int instants)
       const std::size_t lost = stores.size() / 2;
       for (const double t : times) {
         envelope.advance(t, realisers);
-        found.not_extremal += not_extremal(sides, curves, realisers, places, t);
+        const std::vector<std::uint32_t> rank = ranks_at(curves, places, t);
+        found.not_extremal += not_extremal(sides, rank, realisers);
         WideRealisers due = at_begin, without = at_begin;
         for (std::size_t i = 0; i < stores.size(); ++i) {
           const CurveMoment<S> moment{curves.piece(stores[i].realiser), curves.piece(stores[i].before),
@@ -128,7 +141,7 @@ Findings play(const Scene<S>& scene, const BuilderConfig& builder, int instants)
         }
         EXPECT_TRUE(std::equal(due.begin(), due.end(), realisers.begin()))
             << "a store was not carried out at its time";
-        found.without_one_store += not_extremal(sides, curves, without, places, t);
+        found.without_one_store += not_extremal(sides, rank, without);
       }
       // A store begins where its predecessor ends, and its vertex is ahead right after it.
       WideRealisers present = at_begin;

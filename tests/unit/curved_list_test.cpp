@@ -38,11 +38,12 @@ std::vector<Rational> values_at(const FlightPlans<S>& plans, double t) {
   return values;
 }
 
-struct RationalBox {
-  Rational lower[3], upper[3];
+/// Ranks of coordinates among those of all bodies on one axis.
+struct RankBox {
+  std::uint32_t lower[3], upper[3];
 };
 
-bool overlap(const RationalBox& a, const RationalBox& b) {
+bool overlap(const RankBox& a, const RankBox& b) {
   for (int axis = 0; axis < 3; ++axis)
     if (a.lower[axis] > b.upper[axis] || b.lower[axis] > a.upper[axis]) return false;
   return true;
@@ -96,20 +97,28 @@ class Play {
   }
   void audit(double t) {
     last_audit_ = t;
-    std::vector<std::vector<std::pair<std::uint32_t, RationalBox>>> leaves;
+    std::vector<Rational> all[3];
+    std::vector<std::size_t> first_of;  // [body]
     for (std::uint32_t body = 0; body < view_.body_count(); ++body) {
+      first_of.push_back(all[0].size());
       const std::vector<Rational> values = values_at(playback_.plans(body), t);
+      for (std::size_t i = 0; i < values.size(); ++i) all[i % 3].push_back(values[i]);
+    }
+    const std::vector<std::uint32_t> rank[3] = {ranks(all[0]), ranks(all[1]), ranks(all[2])};
+    std::vector<std::vector<std::pair<std::uint32_t, RankBox>>> leaves;
+    for (std::uint32_t body = 0; body < view_.body_count(); ++body) {
       const auto& tree = collision_.forest().tree(body);
       leaves.emplace_back();
       for (std::uint32_t node = 0; node < tree.topology().size(); ++node) {
         const auto vertices = tree.leaf_vertices(node);
         if (vertices.empty()) continue;
-        RationalBox box;
+        RankBox box;
         for (std::size_t axis = 0; axis < 3; ++axis) {
-          box.lower[axis] = box.upper[axis] = values[3 * vertices[0] + axis];
+          const std::uint32_t* const own = rank[axis].data() + first_of[body];
+          box.lower[axis] = box.upper[axis] = own[vertices[0]];
           for (const std::uint32_t v : vertices) {
-            box.lower[axis] = std::min(box.lower[axis], values[3 * v + axis]);
-            box.upper[axis] = std::max(box.upper[axis], values[3 * v + axis]);
+            box.lower[axis] = std::min(box.lower[axis], own[v]);
+            box.upper[axis] = std::max(box.upper[axis], own[v]);
           }
         }
         leaves.back().emplace_back(node, box);

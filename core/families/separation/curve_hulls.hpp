@@ -45,8 +45,14 @@ class CurveHulls {
     chains.resize(2 * keyframes * scalars);
     const auto bulge_of = [&](std::size_t k, std::size_t i) -> Bulge<S> {
       if (!plans.curved_in(k)) return {0, 0};
-      const S* const twist = plans.twists(k);
-      return bulge(plans.bends(k)[i], twist == nullptr ? S(0) : twist[i]);
+      const S *const twists = plans.twists(k), bend = plans.bends(k)[i],
+                     twist = twists == nullptr ? S(0) : twists[i];
+      Bulge<S> bounds = bulge(bend, twist);
+      // A quarter of the least numbers is rounded to zero.
+      const double end = double(bend) + double(twist);
+      if (bend < 0 || end < 0) bounds.lower -= outward::least;
+      if (bend > 0 || end > 0) bounds.upper += outward::least;
+      return bounds;
     };
     for (std::size_t k = 0; k < keyframes; ++k)
       for (std::size_t i = 0; i < scalars; ++i) {
