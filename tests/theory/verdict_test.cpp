@@ -332,6 +332,9 @@ TEST(Verdict, Rebuilding) {
   expect_flip(good, holds, fails, judge_rebuild, [](RebuildRun& r) { r.box_tests = 5001; });
   expect_flip(good, holds, condition, judge_rebuild, [](RebuildRun& r) { r.visited = 2001; });
   EXPECT_EQ(judge_rebuild({never}).verdict(), Verdict::not_decided);
+  RebuildRun idle = never;
+  idle.box_tests = 0;
+  EXPECT_EQ(judge_rebuild({idle, median}).verdict(), Verdict::not_decided);
 }
 
 TEST(Verdict, ContinuousCollisionDetection) {
@@ -360,6 +363,8 @@ TEST(Verdict, OtherKindsOfMotion) {
   expect_flip(good, holds, fails, judge_motion, [](MotionRun& r) { r.different = 1; });
   expect_flip(good, holds, fails, judge_motion, [](MotionRun& r) { r.events_at_keyframes = 89; });
   expect_flip(good, holds, condition, judge_motion, [](MotionRun& r) { r.events_on_lines = 44; });
+  expect_flip(good, holds, Verdict::not_decided, judge_motion, [](MotionRun& r) { r.pairs = 0; });
+  expect_flip(good, holds, Verdict::not_decided, judge_motion, [](MotionRun& r) { r.events = 0; });
   EXPECT_EQ(judge_motion({}).verdict(), Verdict::not_decided);
 }
 
