@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 #include <string>
 #include <utility>
@@ -38,7 +39,14 @@ std::vector<Rational> values_at(const FlightPlans<S>& plans, double t) {
   return values;
 }
 
-/// Ranks of coordinates among those of all bodies on one axis.
+/// The ranks of all coordinates at one time among those of all bodies on the same axis.
+struct Ranks {
+  std::vector<std::uint32_t> rank[3];  ///< [axis][vertex of all bodies]
+  std::vector<std::size_t> first_of;   ///< [body]: its first vertex
+};
+/// By time. Plays of one scene share them: queues and leaf sizes change nothing about positions.
+using KnownRanks = std::map<double, Ranks>;
+
 struct RankBox {
   std::uint32_t lower[3], upper[3];
 };
@@ -59,8 +67,10 @@ class Play {
   using Collision = KineticCollision<S, AnyEventQueue, typename Seeded<fault>::template Clock<S>>;
 
  public:
-  Play(const Scene<S>& scene, std::uint32_t leaf_size, const std::string& queue, int look_ahead)
+  Play(const Scene<S>& scene, KnownRanks& known, std::uint32_t leaf_size, const std::string& queue,
+       int look_ahead)
       : scene_(&scene),
+        known_(&known),
         view_(scene),
         playback_(scene),
         collision_(view_, ClipMotion<S>(playback_),
@@ -95,16 +105,22 @@ class Play {
     const double before = std::nextafter(next.hint - next.error, -1e300);
     if (before >= handled_until_ && before >= last_audit_ && before <= t) audit(before);
   }
-  void audit(double t) {
-    last_audit_ = t;
+  const Ranks& ranks_at(double t) {
+    const auto [found, is_new] = known_->try_emplace(t);
+    Ranks& made = found->second;
+    if (!is_new) return made;
     std::vector<Rational> all[3];
-    std::vector<std::size_t> first_of;  // [body]
     for (std::uint32_t body = 0; body < view_.body_count(); ++body) {
-      first_of.push_back(all[0].size());
+      made.first_of.push_back(all[0].size());
       const std::vector<Rational> values = values_at(playback_.plans(body), t);
       for (std::size_t i = 0; i < values.size(); ++i) all[i % 3].push_back(values[i]);
     }
-    const std::vector<std::uint32_t> rank[3] = {ranks(all[0]), ranks(all[1]), ranks(all[2])};
+    for (std::size_t axis = 0; axis < 3; ++axis) made.rank[axis] = ranks(all[axis]);
+    return made;
+  }
+  void audit(double t) {
+    last_audit_ = t;
+    const Ranks& now = ranks_at(t);
     std::vector<std::vector<std::pair<std::uint32_t, RankBox>>> leaves;
     for (std::uint32_t body = 0; body < view_.body_count(); ++body) {
       const auto& tree = collision_.forest().tree(body);
@@ -114,7 +130,7 @@ class Play {
         if (vertices.empty()) continue;
         RankBox box;
         for (std::size_t axis = 0; axis < 3; ++axis) {
-          const std::uint32_t* const own = rank[axis].data() + first_of[body];
+          const std::uint32_t* const own = now.rank[axis].data() + now.first_of[body];
           box.lower[axis] = box.upper[axis] = own[vertices[0]];
           for (const std::uint32_t v : vertices) {
             box.lower[axis] = std::min(box.lower[axis], own[v]);
@@ -147,6 +163,7 @@ class Play {
   }
 
   const Scene<S>* scene_;
+  KnownRanks* known_;
   SceneView<S> view_;
   Playback<S> playback_;
   Counters count_;
@@ -160,10 +177,11 @@ void check_scenes() {
   std::uint64_t events = 0, overlapping = 0, listed = 0, all = 0;
   for (const std::string& name : curved_scene_names()) {
     const Scene<S> scene = curved_scene<S>(name).scene;
+    KnownRanks known;
     for (const std::string& queue : AnyEventQueue<AlgebraicClock<S>>::names())
       for (const std::uint32_t leaf_size : {1u, 4u}) {
         const int look_ahead = leaf_size == 1 ? 1 : OverlapClock<S>::usual_look_ahead;
-        const Findings found = Play<S>(scene, leaf_size, queue, look_ahead).run(4, 11);
+        const Findings found = Play<S>(scene, known, leaf_size, queue, look_ahead).run(4, 11);
         EXPECT_EQ(found.missing, 0u) << name << ", " << queue << ", leaf size " << leaf_size;
         events += found.events;
         overlapping += found.overlapping;
@@ -188,9 +206,11 @@ TEST(CurvedList, LostEventsOfTreesAreFound) {
   std::uint64_t missing = 0;
   for (const std::string name : {"curved_soups", "curved_thrown", "curved_mixed"}) {
     const Scene<float> scene = curved_scene<float>(name).scene;
-    const Findings sound = Play<float>(scene, 1, "binary_heap", 32).run(0, 5);
-    missing +=
-        Play<float, Fault::lost_event>(scene, 1, "binary_heap", 32).run(20, 5, 2 * sound.events).missing;
+    KnownRanks known;
+    const Findings sound = Play<float>(scene, known, 1, "binary_heap", 32).run(0, 5);
+    missing += Play<float, Fault::lost_event>(scene, known, 1, "binary_heap", 32)
+                   .run(20, 5, 2 * sound.events)
+                   .missing;
   }
   EXPECT_GT(missing, 0u);
 }
