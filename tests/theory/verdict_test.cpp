@@ -332,6 +332,7 @@ TEST(Verdict, Rebuilding) {
   expect_flip(good, holds, fails, judge_rebuild, [](RebuildRun& r) { r.box_tests = 5001; });
   expect_flip(good, holds, condition, judge_rebuild, [](RebuildRun& r) { r.visited = 2001; });
   EXPECT_EQ(judge_rebuild({never}).verdict(), Verdict::not_decided);
+  expect_flip(good, holds, Verdict::not_decided, judge_rebuild, [](RebuildRun& r) { r.box_tests = 5000; });
   RebuildRun idle = never;
   idle.box_tests = 0;
   EXPECT_EQ(judge_rebuild({idle, median}).verdict(), Verdict::not_decided);
