@@ -22,13 +22,6 @@ class KineticAabb final : public OnAnyQueue<S> {
                       params.word("query") == "rows" ? KineticQuery::wide_rows : KineticQuery::node_pairs) {
     this->on_forest([&](auto& forest) { forest.choose_queue(params.word("queue")); });
   }
-
- private:
-  static bool any_on_curves(const SceneView<S>& scene, const ClipMotion<S>& motion) {
-    for (std::uint32_t body = 0; body < scene.body_count(); ++body)
-      if (motion.plans(body).curved()) return true;
-    return false;
-  }
 };
 
 }  // namespace

@@ -1,16 +1,20 @@
 // The kinetic BoxTree (Z&W 2006, s.6), with the errata of the reproduction. An inner node has at most two
 // planes; all other sides are inherited. The tree is valid at every time and updated only at events.
-// Degenerated parts can be rebuilt. Queries compute boxes on demand, many at once (BoxTreeRows).
+// Degenerated parts can be rebuilt. Queries compute boxes on demand, many at once (BoxTreeRows). Vertices may
+// move on curves of degree 2 or 3: certificates then compare polynomials.
 //
 // As in the paper, the search for a certificate may read all nodes. It does so where no node owns a side, as
 // in a tree of equal boxes: inserting n of them takes quadratically many steps.
 
+#include <memory>
 #include <numeric>
+#include <variant>
 
 #include "core/contract/registry.hpp"
 #include "core/families/boxtree/boxtree_degradation.hpp"
 #include "core/families/boxtree/boxtree_rows.hpp"
 #include "core/families/boxtree/kinetic_boxtree.hpp"
+#include "core/families/events/algebraic_clock.hpp"
 #include "core/families/events/any_queue.hpp"
 #include "core/families/events/event_log.hpp"
 #include "core/families/wide/lazy_query.hpp"
@@ -35,13 +39,15 @@ class KineticBox final : public CountedStrategy<S>,
                          public EventSource<S>,
                          public TakesPlanChanges<S>,
                          public TakesGeometryChanges<S> {
+  template <class Clock>
+  using Forest = KineticBoxForest<S, AnyEventQueue<Clock>, BoundObserver<S>>;
+
  public:
   static constexpr Foresight foresight = Foresight::whole_clip;
 
   KineticBox(const SceneView<S>& scene, const ClipMotion<S>& motion, Topologies topologies,
              const Params& params)
       : CountedStrategy<S>(scene, motion),
-        forest_(scene, motion, std::move(topologies), this->count_, BoundObserver<S>{&watch_}),
         motion_(motion),
         near_bodies_(scene.pairs(), scene.body_count()),
         leaf_boxes_(params.word("leaf_boxes") == "tight" ? LeafBoxes::tight : LeafBoxes::inherited),
@@ -49,20 +55,26 @@ class KineticBox final : public CountedStrategy<S>,
         rebuilds_(params.word("rebuild") != "never"),
         threshold_(params.number("degradation")),
         frames_per_check_(std::uint64_t(params.number("check_every"))) {
+    if (any_on_curves(scene, motion))
+      make_forest<AlgebraicClock<S>>(scene, std::move(topologies));
+    else
+      make_forest<EventClock<S>>(scene, std::move(topologies));
     if (rebuilds_) {
       method_ = build_method(params.word("rebuild"));
-      for (std::uint32_t body = 0; body < forest_.size(); ++body)
-        caches_.emplace_back(forest_.tree(body).topology().size());
-      degradations_.resize(forest_.size());
+      for (std::uint32_t body = 0; body < rows_.size(); ++body)
+        caches_.emplace_back(tree_of(body).topology().size());
+      degradations_.resize(rows_.size());
     }
     const BoxTreeConstruction made = construction(params, leaf_boxes_, BoxTreeRows<S>::width);
-    forest_.choose_queue(params.word("queue"));
-    for (std::uint32_t body = 0; body < forest_.size(); ++body) forest_.tree(body).construct_as(made);
+    on_forest([&](auto& forest) {
+      forest.choose_queue(params.word("queue"));
+      for (std::uint32_t body = 0; body < forest.size(); ++body) forest.tree(body).construct_as(made);
+    });
   }
 
   void reset_to(double t) override {
     near_bodies_.start_over();
-    forest_.reset(t);
+    on_forest([&](auto& forest) { forest.reset(t); });
     for (std::uint32_t body = 0; body < rows_.size(); ++body) {
       follow_tree(body);
       rows_[body].start_over();
@@ -71,14 +83,14 @@ class KineticBox final : public CountedStrategy<S>,
     plans_changed_ = false;
     frames_ = 0;
     for (std::uint32_t body = 0; body < degradations_.size(); ++body) {
-      const auto& tree = forest_.tree(body);
+      const BoxTreeBounds& tree = tree_of(body);
       const auto boxes = all_boxes(tree, body);
       degradations_[body].start(tree.topology(), order_, boxes);
     }
   }
 
   void advance_to(double t) override {
-    forest_.advance(t);
+    on_forest([&](auto& forest) { forest.advance(t); });
     for (std::uint32_t body = 0; body < rows_.size(); ++body) rows_[body].new_frame(motion_, body);
     for (auto& cache : caches_) cache.new_frame();
     if (rebuilds_ && ++frames_ % frames_per_check_ == 0)
@@ -115,7 +127,7 @@ class KineticBox final : public CountedStrategy<S>,
   }
 
   void follow_plans(double t, std::span<const PlanChange<S>> changes) override {
-    forest_.plans_changed(t, changes);
+    on_forest([&](auto& forest) { forest.plans_changed(t, changes); });
     plans_changed_ = true;
     for (const PlanChange<S>& change : changes) rows_[change.body].plans_changed();
     for (std::uint32_t body = 0; body < rows_.size(); ++body) changed_now(body);  // realisers may differ now
@@ -123,7 +135,7 @@ class KineticBox final : public CountedStrategy<S>,
 
   void follow_geometry(double t, const GeometryChange<S>& change) override {
     const std::vector<BodyChange> changes = body_changes(this->scene_, change);
-    forest_.geometry_changed(t, this->scene_, this->sampled_, changes);
+    on_forest([&](auto& forest) { forest.geometry_changed(t, this->scene_, this->sampled_, changes); });
     plans_changed_ = true;  // bodies that were at rest may move
     for (const BodyChange& own : changes) {
       follow_tree(own.body);
@@ -131,7 +143,7 @@ class KineticBox final : public CountedStrategy<S>,
     }
     if (!rebuilds_) return;
     for (const BodyChange& own : changes) {
-      const auto& tree = forest_.tree(own.body);
+      const BoxTreeBounds& tree = tree_of(own.body);
       caches_[own.body].resize(tree.topology().size());
       const auto boxes = all_boxes(tree, own.body);
       degradations_[own.body].edited(tree.topology(), order_, boxes);
@@ -139,23 +151,26 @@ class KineticBox final : public CountedStrategy<S>,
   }
 
   std::optional<ScheduledEvent<S>> next_event() const override {
-    return forest_.queue().empty() ? std::optional<ScheduledEvent<S>>()
-                                   : described(forest_, forest_.queue().top());
+    return on_forest([](auto& forest) {
+      return forest.queue().empty() ? std::optional<ScheduledEvent<S>>()
+                                    : described(forest, forest.queue().top());
+    });
   }
-  void scheduled_events(std::vector<ScheduledEvent<S>>& out) const override { list_events(forest_, out); }
-  const Topology& tree(std::uint32_t body) const override { return forest_.tree(body).topology(); }
+  void scheduled_events(std::vector<ScheduledEvent<S>>& out) const override {
+    on_forest([&](auto& forest) { list_events(forest, out); });
+  }
+  const Topology& tree(std::uint32_t body) const override { return tree_of(body).topology(); }
   std::uint32_t realiser(std::uint32_t body, std::uint32_t node, std::uint32_t side) const override {
-    return forest_.tree(body).realiser_or_none(node, side);
+    return tree_of(body).realiser_or_none(node, side);
   }
   void watch_bounds(std::vector<BoundNotice<S>>* log) override { watch_.log = log; }
 
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
-    const auto& tree = forest_.tree(body);
+    const BoxTreeBounds& tree = tree_of(body);
     std::vector<std::uint32_t> order;
     AuditView view{tree.compacted_topology(order), {}, {}};
     BoxCache<S> cache(tree.topology().size());
-    InheritedBoxes<S, std::remove_cvref_t<decltype(tree)>> boxes(tree, this->sampled_, body, cache,
-                                                                 leaf_boxes_);
+    InheritedBoxes<S, BoxTreeBounds> boxes(tree, this->sampled_, body, cache, leaf_boxes_);
     for (const std::uint32_t node : order) {
       boxes.ensure(node);
       // Reports the box that a query has read, if there is one.
@@ -167,7 +182,7 @@ class KineticBox final : public CountedStrategy<S>,
   }
 
   std::size_t bytes() const override {
-    std::size_t total = forest_.bytes();
+    std::size_t total = on_forest([](auto& forest) { return forest.bytes(); });
     total += near_bodies_.bytes() + query_.bytes() + probes_.bytes();
     for (const auto& rows : rows_) total += rows.bytes();
     for (const auto& cache : caches_) total += cache.bytes();
@@ -177,23 +192,38 @@ class KineticBox final : public CountedStrategy<S>,
 
  protected:
   bool step(double until, EventDescription<S>& out) override {
-    return step_forest(forest_, watch_, until, out);
+    return on_forest([&](auto& forest) { return step_forest(forest, watch_, until, out); });
   }
   void counts_cleared() override {
-    first_step_ = forest_.queue().steps();
-    for (std::uint32_t body = 0; body < forest_.size(); ++body) forest_.tree(body).search_cost().forget();
+    on_forest([&](auto& forest) {
+      first_step_ = forest.queue().steps();
+      for (std::uint32_t body = 0; body < forest.size(); ++body) forest.tree(body).search_cost().forget();
+    });
   }
   void add_counts(Counters& table) const override {
-    table[Counter::queue_steps] = forest_.queue().steps() - first_step_;
     SearchCost cost;
-    for (std::uint32_t body = 0; body < forest_.size(); ++body) cost.add(forest_.tree(body).search_cost());
+    on_forest([&](const auto& forest) {
+      table[Counter::queue_steps] = forest.queue().steps() - first_step_;
+      for (std::uint32_t body = 0; body < forest.size(); ++body) cost.add(forest.tree(body).search_cost());
+    });
     table.add("certificate_searches", cost.searches);
     table.add("nodes_searched", cost.nodes);
     table.add("most_nodes_searched", cost.most_nodes);
   }
 
  private:
-  const BoxTreeBounds& tree_of(std::uint32_t body) const { return forest_.tree(body); }
+  template <class Clock>
+  void make_forest(const SceneView<S>& scene, Topologies topologies) {
+    forest_ = std::make_unique<Forest<Clock>>(scene, motion_, std::move(topologies), this->count_,
+                                              BoundObserver<S>{&watch_});
+  }
+  template <class Work>
+  decltype(auto) on_forest(Work&& work) const {
+    return std::visit([&](const auto& forest) -> decltype(auto) { return work(*forest); }, forest_);
+  }
+  const BoxTreeBounds& tree_of(std::uint32_t body) const {
+    return on_forest([&](const auto& forest) -> const BoxTreeBounds& { return forest.tree(body); });
+  }
   /// Lays out a body's rows again if its tree has changed.
   void follow_tree(std::uint32_t body) {
     rows_[body].follow(tree_of(body), this->scene_.primitives(body), leaf_boxes_);
@@ -209,26 +239,28 @@ class KineticBox final : public CountedStrategy<S>,
   }
 
   /// Computes the boxes of all nodes. Stores the nodes in `order_`, parents before children.
-  template <class Tree>
-  InheritedBoxes<S, Tree> all_boxes(const Tree& tree, std::uint32_t body) {
+  InheritedBoxes<S, BoxTreeBounds> all_boxes(const BoxTreeBounds& tree, std::uint32_t body) {
     if (tree.edited()) {
       tree.compacted_topology(order_);
     } else {
       order_.resize(tree.topology().size());
       std::iota(order_.begin(), order_.end(), 0u);
     }
-    InheritedBoxes<S, Tree> all(tree, this->sampled_, body, caches_[body], leaf_boxes_);
+    InheritedBoxes<S, BoxTreeBounds> all(tree, this->sampled_, body, caches_[body], leaf_boxes_);
     for (const std::uint32_t node : order_) all.ensure(node);
     return all;
   }
 
   void rebuild_degenerate(std::uint32_t body) {
-    auto& tree = forest_.tree(body);
+    const BoxTreeBounds& tree = tree_of(body);
     auto all = all_boxes(tree, body);
     this->count_.add(Counter::nodes_visited, tree.topology().size());
     const auto& nodes = degradations_[body].beyond(threshold_, tree.topology(), order_, all);
     if (nodes.empty()) return;
-    for (const std::uint32_t node : nodes) tree.rebuild_below(node, all(node), this->sampled_, method_);
+    on_forest([&](auto& forest) {
+      for (const std::uint32_t node : nodes)
+        forest.tree(body).rebuild_below(node, all(node), this->sampled_, method_);
+    });
     follow_tree(body);
     changed_now(body);
     const auto rebuilt = all_boxes(tree, body);
@@ -237,7 +269,7 @@ class KineticBox final : public CountedStrategy<S>,
   }
 
   BoundWatch<S> watch_;
-  KineticBoxForest<S, AnyQueue<S>, BoundObserver<S>> forest_;
+  std::variant<std::unique_ptr<Forest<EventClock<S>>>, std::unique_ptr<Forest<AlgebraicClock<S>>>> forest_;
   ClipMotion<S> motion_;
   NearBodies near_bodies_;
   LeafBoxes leaf_boxes_;
@@ -270,7 +302,8 @@ KBVH_STRATEGY(kinetic_boxtree) {
       .positions = PositionUse::fetched,
       .declares = {.continuous = true,
                    .restructures = true /* with rebuild=median or sah */,
-                   .time_budget = true},
+                   .time_budget = true,
+                   .curves = true},
       .topology = {.widths = {2}, .preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 16}},
       .parameters =
           {queue_parameter(),

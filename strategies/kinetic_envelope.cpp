@@ -2,9 +2,13 @@
 // finds the sides whose realiser will change in it. The upper envelopes of these few sides give a list of
 // stores, sorted by time, that frames apply (core/families/envelope/segment_envelope.hpp). If the whole clip
 // is known, the frames of a segment can share the pass for the next segment.
+//
+// Vertices may move on curves of degree 2 or 3. The envelopes of such a segment are those of curves
+// (core/families/envelope/curve_envelope.hpp), and one pass makes them at its start.
 
 #include "core/base/pacer.hpp"
 #include "core/contract/registry.hpp"
+#include "core/families/envelope/curve_envelope.hpp"
 #include "core/families/envelope/realiser_strategy.hpp"
 #include "core/families/envelope/segment_envelope.hpp"
 
@@ -16,6 +20,7 @@ enum class Known : std::uint8_t {
   nothing,   ///< not yet
   at_rest,   ///< unchanged until the segment ends
   envelope,  ///< the envelope of the segment
+  curves,    ///< the envelope of the segment, in which vertices move on curves
   refitted,  ///< vertices have their own plans: boxes are refitted at every frame instead
 };
 
@@ -41,6 +46,7 @@ class Envelopes final : public RealiserStrategy<S>, public TakesPlanChanges<S> {
     for (std::uint32_t index = 0; index < scene.body_count(); ++index) {
       const auto& hierarchy = this->hierarchy(index);
       states_[index].envelope.assign(hierarchy, ahead ? slices : 1);
+      if (motion.has_curves(index)) states_[index].curves.assign(hierarchy);
       if (ahead)
         states_[index].at_end.assign(hierarchy.node_count() * lane_scalars(hierarchy.topology().width), 0);
     }
@@ -68,6 +74,9 @@ class Envelopes final : public RealiserStrategy<S>, public TakesPlanChanges<S> {
         state.envelope.advance(t, this->bodies_[body].realisers);
         this->new_frame(body);
         work_ahead(body, step);
+      } else if (state.known == Known::curves) {
+        state.curves.advance(t, this->bodies_[body].realisers);
+        this->new_frame(body);
       }
     }
   }
@@ -85,27 +94,31 @@ class Envelopes final : public RealiserStrategy<S>, public TakesPlanChanges<S> {
   std::size_t bytes() const override {
     std::size_t total = Base::bytes();
     for (const State& state : states_)
-      total += state.envelope.bytes() + state.at_end.size() * sizeof(std::uint32_t) +
+      total += state.envelope.bytes() + state.curves.bytes() + state.at_end.size() * sizeof(std::uint32_t) +
                (state.room[0].capacity() + state.room[1].capacity()) * sizeof(S);
     return total;
   }
 
  protected:
   void counts_cleared() override {
-    for (State& state : states_) state.envelope.clear_counts();
+    for (State& state : states_) {
+      state.envelope.clear_counts();
+      state.curves.clear_counts();
+    }
   }
   void add_counts(Counters& table) const override {
-    for (const State& state : states_) {
-      const EnvelopeCounts& counts = state.envelope.counts();
-      table[Counter::certificates_made] += counts.crossings;
-      table[Counter::certificates_failed] += counts.stores;
-      table[Counter::values_written] += counts.stores;
-    }
+    for (const State& state : states_)
+      for (const EnvelopeCounts& counts : {state.envelope.counts(), state.curves.counts()}) {
+        table[Counter::certificates_made] += counts.crossings;
+        table[Counter::certificates_failed] += counts.stores;
+        table[Counter::values_written] += counts.stores;
+      }
   }
 
  private:
   struct State {
     SegmentEnvelope<S> envelope;
+    CurveEnvelope<S> curves;
     Known known = Known::nothing;
     double end = 0;          ///< of the segment
     std::vector<S> room[2];  ///< for positions at the segment's ends that are not stored
@@ -152,11 +165,20 @@ class Envelopes final : public RealiserStrategy<S>, public TakesPlanChanges<S> {
       find_realisers(this->hierarchy(index), first, body.realisers);
     else if (state.known == Known::envelope)
       state.envelope.advance(state.end, body.realisers);
+    else if (state.known == Known::curves)
+      state.curves.advance(state.end, body.realisers);
     if (!continues) count_pass(index);
     state.end = motion.lines_end(index);
     if (rests) {
       state.known = Known::at_rest;
       return continues;
+    }
+    if (motion.on_curves(index)) {
+      state.known = Known::curves;
+      state.curves.make(this->hierarchy(index), body.realisers, CurvedMotion<S>(motion).curves(index));
+      count_pass(index);
+      state.curves.advance(t, body.realisers);
+      return false;
     }
     const S* last = motion.positions_on_lines(index, state.end, state.room[1]);
     state.known = Known::envelope;
@@ -182,7 +204,7 @@ class Envelopes final : public RealiserStrategy<S>, public TakesPlanChanges<S> {
     State& state = states_[index];
     if (!(state.end < std::numeric_limits<double>::infinity()) || !view_.as_in_the_scene(index)) return;
     const SegmentMotion<S> later = view_.from(state.end);
-    if (later.at_rest(index)) return;
+    if (later.at_rest(index) || later.on_curves(index)) return;
     if (translates(later, index)) {
       state.next = Next::translated;
       return;
@@ -235,9 +257,11 @@ Info info_of(std::string id, std::string title) {
       .id = std::move(id),
       .title = std::move(title),
       .family = "kinetic",
-      .citation = "kbvh; upper envelopes of lines instead of the event queue of Zachmann & Weller 2006, s.4",
+      .citation =
+          "kbvh; upper envelopes of lines and curves instead of the event queue of Zachmann & Weller 2006, "
+          "s.4",
       .positions = PositionUse::fetched,
-      .declares = {.event_driven = true, .continuous = true, .time_budget = true},
+      .declares = {.event_driven = true, .continuous = true, .time_budget = true, .curves = true},
       .topology = {.preferred = {.method = BuildMethod::median, .width = 8, .leaf_size = 8}},
   };
 }

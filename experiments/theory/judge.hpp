@@ -31,6 +31,12 @@ Claim judge_list_size(const std::vector<ListSizeRun>& sizes);                // 
 Claim judge_plan_changes(const std::vector<PlanRun>& plans);                 // T15
 Claim judge_lower_bound(const std::vector<LooseRun>& loose);                 // T16
 
+// What the paper proposes in its last section.
+Claim judge_order(const std::vector<OrderRun>& orders);        // C1
+Claim judge_rebuild(const std::vector<RebuildRun>& rebuilds);  // C2
+Claim judge_sweeps(const std::vector<SweepRun>& sweeps);       // C3
+Claim judge_motion(const std::vector<MotionRun>& motions);     // C4
+
 /// Short names for criteria.
 inline constexpr Role always = Role::always, as_stated = Role::as_stated;
 

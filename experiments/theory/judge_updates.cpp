@@ -22,6 +22,26 @@ std::string place(const FrameRun& run) {
 std::string percent(double share) {
   return fmt::format("{:.3g}%", 100 * share);
 }
+/// Says how many changes the curves have that were built to have many: the largest run of each scene.
+std::string reached_bounds(const std::vector<CurveRun>& curves) {
+  std::map<std::string, const CurveRun*> largest;
+  for (const CurveRun& run : curves) {
+    if (run.built == 0) continue;
+    const CurveRun*& kept = largest[run.scene];
+    if (kept == nullptr || run.vertices > kept->vertices) kept = &run;
+  }
+  std::string all;
+  for (const auto& [scene, run] : largest) {
+    all += fmt::format("; a bound of {} {} has {} changes", number(run->vertices), scene,
+                       number(run->most_changes));
+    // lambda_2(n) is known, lambda_3(n) is not.
+    if (run->order == 2)
+      all += fmt::format(", {} of lambda_2(n) - 1", percent(run->fullest));
+    else
+      all += fmt::format(" ({} are the most for parabolas)", number(2 * run->vertices - 2));
+  }
+  return all;
+}
 }  // namespace
 
 std::vector<GrowthFit> fit_growth(const std::vector<CountRun>& counts, std::size_t fewest) {
@@ -68,7 +88,8 @@ Claim judge_number_of_events(const std::vector<CountRun>& counts, const std::vec
               .bound =
                   "segments x sum over nodes and sides of (vertices below - 1); lambda_1(n) - 1 = n - 1 "
                   "breakpoints per bound and segment; curves of degree 2 and 3: lambda_2(n) - 1 = 2 n - 2, "
-                  "lambda_3(n) <= n (1 + 2 H(n - 1)); exponent of n log n not above 1 + 5%",
+                  "lambda_3(n) <= n (1 + 2 H(n - 1)); parabolas built for it reach lambda_2(n) - 1, cubics "
+                  "3 n - 3; exponent of n log n not above 1 + 5%",
               .condition =
                   "the bound includes the number of segments as a factor; the closeness to n log n depends "
                   "on the motion",
@@ -89,11 +110,16 @@ Claim judge_number_of_events(const std::vector<CountRun>& counts, const std::vec
     pieces += run.pieces, over += run.over_lambda;
     fullest = std::max(fullest, run.fullest), most = std::max(most, run.most_breakpoints);
   }
-  for (const CurveRun& run : curves)
+  for (const CurveRun& run : curves) {
     claim.criteria.push_back(
         {fmt::format("bounds with more than lambda_{}(n) - 1 changes in a segment, {}, {} segments",
                      run.order, place(run), run.segments),
          double(run.over_lambda), Relation::equal, 0, 0, always});
+    if (run.built > 0)
+      claim.criteria.push_back({fmt::format("changes of a bound of {} {} that are built for this number",
+                                            number(run.vertices), run.scene),
+                                double(run.most_changes), Relation::equal, double(run.built), 0, always});
+  }
   std::vector<std::string> exponents, faster;
   double worst = 0;
   std::size_t sizes = 0;
@@ -115,10 +141,13 @@ Claim judge_number_of_events(const std::vector<CountRun>& counts, const std::vec
         ", and no exact envelope of {} (bounds x segments) {} n - 1 breakpoints (the fullest has {} of them, "
         "the longest {})",
         number(pieces), over == 0 ? "has more than" : "should have more than", percent(fullest), most);
-  for (const CurveRun& run : curves)
+  for (const CurveRun& run : curves) {
+    if (run.built > 0) continue;
     claim.why +=
         fmt::format("; on curves of degree {} ({}, {}) the fullest bound has {} of lambda_{}(n) - 1 changes",
                     run.order, run.scene, counted(run.segments, "segment"), percent(run.fullest), run.order);
+  }
+  claim.why += reached_bounds(curves);
   if (fits.empty())
     claim.why += "; no family has enough sizes with events for a fit.";
   else

@@ -54,9 +54,10 @@ struct CurveRun {
   std::uint64_t pieces = 0, over_lambda = 0;  ///< bounds x segments; with more changes than lambda_s(n) - 1
   std::uint64_t most_changes = 0;             ///< of one bound in one segment
   double fullest = 0;                         ///< share of lambda_s(n) - 1, n >= 8 vertices below
+  std::uint64_t built = 0;                    ///< `most_changes` for which the scene was built; 0: for none
 };
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CurveRun, scene, triangles, vertices, segments, order, events, changes,
-                                   bounds, pieces, over_lambda, most_changes, fullest)
+                                   bounds, pieces, over_lambda, most_changes, fullest, built)
 
 /// The same clip with the log of every change, checked against independently computed exact envelopes
 /// (envelope.hpp).
@@ -198,6 +199,49 @@ struct ListSizeRun {
   std::uint64_t polygons = 0, list = 0, overlapping = 0;  ///< all pairs of the list; overlapping leaves
 };
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ListSizeRun, scene, polygons, list, overlapping)
+
+/// One clip with queries through a kinetic AABB tree with `width` children per node (C1).
+struct OrderRun {
+  std::string scene;
+  std::uint64_t triangles = 0, width = 2;
+  std::uint64_t events = 0, values = 0;       ///< events; changes of bounds
+  std::uint64_t certificates = 0, steps = 0;  ///< certificates made; comparisons in the queue
+  std::uint64_t box_tests = 0;                ///< of all queries
+};
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(OrderRun, scene, triangles, width, events, values, certificates, steps,
+                                   box_tests)
+
+/// One clip with queries through a kinetic BoxTree, parts of which may be rebuilt (C2).
+struct RebuildRun {
+  std::string scene;
+  std::uint64_t triangles = 0;
+  std::string rebuild;                    ///< how: "never", "median" or "sah"
+  std::uint64_t events = 0, visited = 0;  ///< events; nodes that updates visit, with all searches
+  std::uint64_t box_tests = 0;            ///< of all queries
+};
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(RebuildRun, scene, triangles, rebuild, events, visited, box_tests)
+
+/// The contacts of one clip (C3).
+struct SweepRun {
+  std::string scene;
+  std::uint64_t triangles = 0;
+  std::uint64_t sweeps = 0, tested_all = 0;   ///< keyframe intervals; those in which all pairs were tested
+  std::uint64_t contacts = 0, different = 0;  ///< of the list; in only one of these and another answer
+  std::uint64_t list_pairs = 0, refit_pairs = 0;  ///< pairs of triangles that reached their test
+};
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SweepRun, scene, triangles, sweeps, tested_all, contacts, different,
+                                   list_pairs, refit_pairs)
+
+/// One clip on curves through the kinetic AABB tree (C4).
+struct MotionRun {
+  std::string scene;
+  std::uint64_t triangles = 0, segments = 0, degree = 0, frames = 0;
+  std::uint64_t pairs = 0, different = 0;  ///< of the oracle, over all frames; in only one of both answers
+  std::uint64_t events = 0, events_at_keyframes = 0;  ///< at 10 frames per keyframe; at 1
+  std::uint64_t events_on_lines = 0;                  ///< with lines between the keyframes
+};
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(MotionRun, scene, triangles, segments, degree, frames, pairs, different,
+                                   events, events_at_keyframes, events_on_lines)
 
 /// The growth of the number of events of a family of scenes with its vertices.
 struct GrowthFit {

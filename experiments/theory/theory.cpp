@@ -1,5 +1,6 @@
 #include "experiments/theory/theory.hpp"
 
+#include <algorithm>
 #include <fstream>
 #include <optional>
 
@@ -12,6 +13,7 @@
 #include "experiments/theory/measure_counts.hpp"
 #include "experiments/theory/measure_curves.hpp"
 #include "experiments/theory/measure_exact.hpp"
+#include "experiments/theory/measure_proposals.hpp"
 #include "experiments/theory/measure_separation.hpp"
 #include "experiments/theory/theory_scenes.hpp"
 
@@ -147,6 +149,7 @@ class Runner {
                                      parameters + "+" + std::to_string(options_->instants),
                                      [&] { return measure_exact(scene(), options_->instants); }));
     if (size <= options_->list_limit) separation(family, size, parameters);
+    if (chosen(size, 500)) proposals(family, size, parameters);
     if (chosen(size, 250)) plan_changes(family, parameters, scene);
     if (!chosen(size, 500)) return;
     const auto frames =
@@ -166,6 +169,11 @@ class Runner {
           Scene<float> scene = moving_scene(family, size, keyframes);
           scene.name = family;
           return measure_curves(scene);
+        }));
+        motions_.push_back(get<MotionRun>("motion", family, parameters, [&] {
+          Scene<float> scene = colliding_scene(family, size, keyframes);
+          scene.name = family;
+          return measure_motion(scene);
         }));
       }
     }
@@ -197,6 +205,27 @@ class Runner {
       separations_.push_back(get<SeparationRun>(
           "separation list", family, parameters + "+" + std::to_string(options_->list_audits),
           [&] { return measure_separation(scene(), options_->list_audits); }));
+  }
+
+  /// What the paper proposes in its last section.
+  void proposals(const std::string& family, std::uint32_t size, const std::string& parameters) {
+    LazyScene scene([&] {
+      Scene<float> made = colliding_scene(family, size, options_->keyframes);
+      made.name = family;
+      return made;
+    });
+    for (const std::uint32_t width : {2U, 4U, 8U})
+      orders_.push_back(get<OrderRun>("order " + std::to_string(width), family, parameters,
+                                      [&] { return measure_order(scene(), width); }));
+    for (const std::string rebuild : {"never", "median", "sah"})
+      rebuilds_.push_back(get<RebuildRun>("rebuild " + rebuild, family, parameters,
+                                          [&] { return measure_rebuild(scene(), rebuild); }));
+    const std::uint32_t small = std::min<std::uint32_t>(size, options_->separation_size);
+    sweeps_.push_back(get<SweepRun>("sweeps of " + std::to_string(small), family, parameters, [&] {
+      Scene<float> made = colliding_scene(family, small, options_->keyframes);
+      made.name = family;
+      return measure_sweeps(made);
+    }));
   }
 
   /// Returns the largest size that is checked against exact envelopes.
@@ -234,6 +263,18 @@ class Runner {
     for (const std::uint32_t triangles : {1000u, 4000u})
       fans_.push_back(get<CountRun>("counts", "fan", std::to_string(triangles),
                                     [&] { return measure_counts(fan_scene(triangles)); }));
+    for (const std::uint32_t n : {8U, 32U, 128U})
+      curves_.push_back(get<CurveRun>("curves", "parabolas", std::to_string(n), [&] {
+        CurveRun run = measure_curves(parabolas_scene(n));
+        run.built = 2 * n - 2;
+        return run;
+      }));
+    for (const std::uint32_t n : {2U, 8U})
+      curves_.push_back(get<CurveRun>("curves", "cubics", std::to_string(n), [&] {
+        CurveRun run = measure_curves(cubics_scene(n));
+        run.built = 3 * n - 3;
+        return run;
+      }));
     constructed_ = get<std::vector<FrameRun>>("frames", "tangents", "16", [&] {
       return measure_frames(tangents_scene(16), std::vector<std::uint32_t>{1});
     });
@@ -270,6 +311,10 @@ class Runner {
     claims.push_back(judge_list_size(list_sizes_));
     claims.push_back(judge_plan_changes(plans_));
     claims.push_back(judge_lower_bound(loose_));
+    claims.push_back(judge_order(orders_));
+    claims.push_back(judge_rebuild(rebuilds_));
+    claims.push_back(judge_sweeps(sweeps_));
+    claims.push_back(judge_motion(motions_));
   }
 
   const TheoryOptions* options_;
@@ -287,6 +332,10 @@ class Runner {
   std::vector<SeparationRun> separations_;
   std::vector<ListSizeRun> list_sizes_;
   std::vector<TranslationRun> translations_;
+  std::vector<OrderRun> orders_;
+  std::vector<RebuildRun> rebuilds_;
+  std::vector<SweepRun> sweeps_;
+  std::vector<MotionRun> motions_;
 };
 
 }  // namespace

@@ -35,7 +35,7 @@ TheoryOptions full_theory();
 
 /// The results.
 struct TheoryReport {
-  std::vector<Claim> claims;  ///< T1 to T16
+  std::vector<Claim> claims;  ///< T1 to T16, C1 to C4
   std::vector<CountRun> counts;
   std::vector<GrowthFit> fits;
   std::vector<FrameRun> frames;

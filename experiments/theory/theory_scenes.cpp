@@ -97,6 +97,62 @@ Scene<float> tangents_scene(std::uint32_t vertices) {
   return scene;
 }
 
+namespace {
+/// Makes one control net, whose vertices move on these curves along x.
+Scene<float> net_of_curves(const std::string& name, const std::vector<CurvedPiece<float>>& curves) {
+  const std::size_t n = curves.size();
+  std::vector<std::uint32_t> corners(n);
+  std::vector<float> positions(6 * n, 0.0f);
+  SegmentBends<float> bends{std::vector<float>(3 * n, 0.0f), std::vector<float>(3 * n, 0.0f)};
+  for (std::size_t v = 0; v < n; ++v) {
+    corners[v] = std::uint32_t(v);
+    positions[3 * v] = curves[v].x0;
+    positions[3 * (n + v)] = curves[v].x1;
+    bends.bend[3 * v] = curves[v].bend;
+    bends.twist[3 * v] = curves[v].twist;
+  }
+  if (std::all_of(bends.twist.begin(), bends.twist.end(), [](float x) { return x == 0; }))
+    bends.twist.clear();
+  Body<float> body;
+  body.name = name;
+  body.primitives.kind = PrimitiveKind::control_nets;
+  body.primitives.add(corners);
+  body.plans = FlightPlans<float>(std::uint32_t(n), {0.0, 1.0}, std::move(positions), {std::move(bends)});
+  Scene<float> scene;
+  scene.name = name;
+  scene.bodies.push_back(std::move(body));
+  validate(scene);
+  return scene;
+}
+}  // namespace
+
+Scene<float> parabolas_scene(std::uint32_t vertices) {
+  // Narrow parabolas height - (s - top)^2 rise above the line x = 0 one after the other: 0 1 0 2 0 ... 0.
+  std::vector<CurvedPiece<float>> curves(1);
+  const double gaps = vertices - 1, height = 0.09 / (gaps * gaps);
+  for (std::uint32_t v = 1; v < vertices; ++v) {
+    const double top = (v - 0.5) / gaps;
+    curves.push_back({0, 1, float(height - top * top), float(height - (1 - top) * (1 - top)), 1, 0});
+  }
+  return net_of_curves("parabolas", curves);
+}
+
+Scene<float> cubics_scene(std::uint32_t vertices) {
+  // Cubics k ((s - a)^2 - w^2) (s - z) rise above the line x = 0 for a short time around s = a, one after the
+  // other, and for good at s = z, each steeper than those before: 0 1 0 2 0 ... 0 1 2 3 ...
+  std::vector<CurvedPiece<float>> curves(1);
+  const double last = std::max<std::uint32_t>(vertices - 1, 2) - 1;
+  double k = 1;
+  for (std::uint32_t v = 1; v < vertices; ++v, k *= 8) {
+    const double a = 0.08 + 0.36 * (v - 1) / last, w = std::min(0.05, 0.1 / last),
+                 z = 0.6 + 0.2 * (v - 1) / last;
+    // In powers of s.
+    const double c0 = -k * z * (a * a - w * w), c1 = k * (2 * a * z + a * a - w * w), c2 = -k * (z + 2 * a);
+    curves.push_back({0, 1, float(c0), float(c0 + c1 + c2 + k), float(-k - c2), float(-k)});
+  }
+  return net_of_curves("cubics", curves);
+}
+
 Scene<float> fan_scene(std::uint32_t triangles) {
   Scene<float> scene;
   scene.name = "fan";

@@ -24,6 +24,13 @@ std::optional<Scene<float>> data_scene(const std::string& name, std::size_t keyf
 /// second, its upper x bound passes through all of them (claim T9). All coordinates are exact in float.
 Scene<float> tangents_scene(std::uint32_t vertices);
 
+/// Make one control net of vertices that move along x in one segment, of one second, so that its upper x
+/// bound has as many changes as the degree allows (parabolas: 2 n - 2), or more than any parabolas (cubics: 3
+/// n - 3; every two of them cross three times). Vertex 0 is at rest. At least two vertices; at most 12
+/// cubics, for their coefficients grow by a factor of 8 each.
+Scene<float> parabolas_scene(std::uint32_t vertices);
+Scene<float> cubics_scene(std::uint32_t vertices);
+
 /// Makes a fan: `triangles` around one vertex, at rest. Its hub takes part in every leaf's certificates (T4).
 Scene<float> fan_scene(std::uint32_t triangles);
 

@@ -1,18 +1,17 @@
 #pragma once
 #include <algorithm>
-#include <boost/multiprecision/gmp.hpp>
 #include <cmath>
+#include <cstdint>
+#include <numeric>
 #include <vector>
 
 #include "core/motion/curved_piece.hpp"
+#include "tests/support/rational_geometry.hpp"
 
 // Curves by rational arithmetic, from the definition in core/motion/curved_piece.hpp and nothing else of the
 // library: the reference for roots, order and signs.
 
 namespace kbvh::test {
-
-using Rational =
-    boost::multiprecision::number<boost::multiprecision::gmp_rational, boost::multiprecision::et_off>;
 
 /// Coefficients, [0] of s^0; without leading zeros, empty: zero.
 using RationalPolynomial = std::vector<Rational>;
@@ -152,6 +151,17 @@ template <class S>
 Rational rational_value(const CurvedPiece<S>& p, const Rational& t) {
   const Rational s = (t - Rational(p.t0)) / (Rational(p.t1) - Rational(p.t0));
   return value(rational_difference(p, CurvedPiece<S>{p.t0, p.t1, 0, 0, 0, 0}), s);
+}
+
+/// Returns each value's rank, ascending from 0; equal values have the same rank.
+inline std::vector<std::uint32_t> ranks(const std::vector<Rational>& values) {
+  std::vector<std::uint32_t> order(values.size()), result(values.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::sort(order.begin(), order.end(),
+            [&](std::uint32_t a, std::uint32_t b) { return values[a].compare(values[b]) < 0; });
+  for (std::size_t i = 1; i < order.size(); ++i)
+    result[order[i]] = result[order[i - 1]] + (values[order[i]].compare(values[order[i - 1]]) == 0 ? 0 : 1);
+  return result;
 }
 
 }  // namespace kbvh::test

@@ -311,8 +311,9 @@ TEST(Contract, StrategiesSayWhetherTheyFollowCurves) {
     if (entry.info.foresight <= Foresight::step_bound) {
       EXPECT_TRUE(entry.info.can.curves) << entry.info.id;
     }
-  EXPECT_TRUE(find_strategy("kinetic_aabb").info.can.curves);
-  EXPECT_TRUE(find_strategy("linear_bounds").info.can.curves);
+  for (const char* id : {"kinetic_aabb", "kinetic_boxtree", "kinetic_envelope", "kinetic_kdop",
+                         "kinetic_separation_list", "linear_bounds"})
+    EXPECT_TRUE(find_strategy(id).info.can.curves) << id;
   EXPECT_FALSE(find_strategy("interval_join").info.can.curves);
 }
 

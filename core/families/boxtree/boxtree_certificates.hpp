@@ -33,9 +33,13 @@ namespace kbvh {
 /// realiser_plan_changed.
 template <class S, class Queue, class Observer>
 class BoxTreeCertificates : public BoxTreeBounds {
+ protected:
+  using Clock = typename Queue::ClockType;
+  using Now = typename InstantOf<Clock, S>::type;
+
  public:
   BoxTreeCertificates(Topology topology, const Primitives& primitives, std::uint32_t body,
-                      std::uint32_t first_slot, EventClock<S>& clock, Queue& queue, Counters& count,
+                      std::uint32_t first_slot, Clock& clock, Queue& queue, Counters& count,
                       Observer observer)
       : BoxTreeBounds(std::move(topology), primitives, body, first_slot),
         clock_(&clock),
@@ -54,8 +58,8 @@ class BoxTreeCertificates : public BoxTreeBounds {
   /// each (Z&W Theorem 5: responsive in one dimension only).
   void handle(const Event& event) {
     KBVH_ASSERT(event.body == body_);
-    Crossing<S> crossing;
-    const Instant<S> now = certifier_.instant_of(event, reads_instants(observer_), crossing);
+    typename Now::Exact crossing;
+    const Now now = certifier_.instant_of(event, reads_instants(observer_), crossing);
     std::uint32_t at = slots_.place(event.slot);
     KBVH_ASSERT(bounds_[at].realiser == event.winner);
     count_->add(Counter::certificates_failed);
@@ -73,11 +77,12 @@ class BoxTreeCertificates : public BoxTreeBounds {
   /// Searches the next failure of a certificate that holds at t, a keyframe time.
   void review(const Event& event, double t) {
     count_->add(Counter::queue_operations);
-    certify(slots_.place(event.slot), event.side, Instant<S>::at(t));
+    certify(slots_.place(event.slot), event.side, Now::at(t));
   }
   /// Prefetches the data that the event will read: in step 0 its bound, in step 1 the bound above and the
   /// list of candidates, in step 2 the keyframes of the first candidates.
-  void fetch_ahead(const PackedEvent& event, std::uint32_t slot_of_event, int step) const {
+  template <class StoredEvent>
+  void fetch_ahead(const StoredEvent& event, std::uint32_t slot_of_event, int step) const {
     if (!listed_) return;
     const Bound& bound = bounds_[slots_.place(slot_of_event)];
     if (step == 0) {
@@ -173,7 +178,7 @@ class BoxTreeCertificates : public BoxTreeBounds {
 
   /// Finds the realisers of a node's own sides and schedules their certificates. Requires the realisers
   /// below.
-  void start(std::uint32_t node, const Instant<S>& now) {
+  void start(std::uint32_t node, const Now& now) {
     std::uint32_t any = node;
     while (!topology_.nodes[any].is_leaf()) any = topology_.nodes[any].first();
     for (std::uint32_t sides = sides_of(node); sides != 0; sides &= sides - 1) {
@@ -184,21 +189,21 @@ class BoxTreeCertificates : public BoxTreeBounds {
     }
   }
 
-  void replace(std::uint32_t at, Side side, std::uint32_t vertex, const Instant<S>& now) {
+  void replace(std::uint32_t at, Side side, std::uint32_t vertex, const Now& now) {
     const std::uint32_t old = std::exchange(bounds_[at].realiser, vertex);
     count_->add(Counter::values_written);
     observer_.template realiser_changed<S>(body_, node_at(at), side, old, vertex, now);
   }
 
   /// Schedules the earliest failure of a bound's certificate from `now` on, and replaces the scheduled one.
-  void certify(std::uint32_t at, Side side, const Instant<S>& now) {
+  void certify(std::uint32_t at, Side side, const Now& now) {
     certifier_.certify(event_of(at, side), now, candidates(at, side));
   }
 
   /// Updates a certificate in which `after` replaces the candidate `before`. Requires that `after` is not
   /// ahead of the realiser. The other candidates are searched again only if `before` was the next loser.
   void exchange_candidate(std::uint32_t at, Side side, std::uint32_t before, std::uint32_t after,
-                          const Instant<S>& now) {
+                          const Now& now) {
     const std::uint32_t slot = slots_.slot(at);
     if (queue_->scheduled(slot) && queue_->event(slot).loser == before) return certify(at, side, now);
     certifier_.add_candidate(event_of(at, side), now, after);
@@ -208,7 +213,7 @@ class BoxTreeCertificates : public BoxTreeBounds {
     return search_.bytes() + (list_.capacity() + candidates_.capacity()) * sizeof(std::uint32_t);
   }
 
-  EventClock<S>* clock_;
+  Clock* clock_;
   Queue* queue_;
   Counters* count_;
   Observer observer_;

@@ -27,11 +27,12 @@ class KineticBoxTree : public BoxTreeCertificates<S, Queue, Observer> {
   using Base::body_, Base::bounds_, Base::clock_, Base::count_, Base::editor_, Base::leaves_,
       Base::own_sides_, Base::place, Base::queue_, Base::search_, Base::sides_of, Base::slots_,
       Base::topology_, Base::version_;
+  using typename Base::Now;
 
  public:
   /// Throws std::invalid_argument if the topology is not binary.
   KineticBoxTree(Topology topology, const Primitives& primitives, std::uint32_t body,
-                 std::uint32_t first_slot, EventClock<S>& clock, Queue& queue, Counters& count,
+                 std::uint32_t first_slot, typename Queue::ClockType& clock, Queue& queue, Counters& count,
                  Observer observer = {})
       : Base(std::move(topology), primitives, body, first_slot, clock, queue, count, observer) {}
 
@@ -54,7 +55,7 @@ class KineticBoxTree : public BoxTreeCertificates<S, Queue, Observer> {
     const std::vector<std::uint32_t> all = choose_planes(0, clip, nullptr);
     this->forget_lists();
     if (construction_.candidates == Candidates::listed) this->list_candidates(all);
-    const auto now = Instant<S>::at(t);
+    const auto now = Now::at(t);
     for (std::size_t i = all.size(); i-- > 0;) this->start(all[i], now);
   }
 
@@ -151,7 +152,7 @@ class KineticBoxTree : public BoxTreeCertificates<S, Queue, Observer> {
     this->forget_lists();
     regrow(top, motion, method);
     const std::vector<std::uint32_t> ids = choose_planes(top, ClipMoments<S>(motion.positions(body_)), &box);
-    const auto now = Instant<S>::at(motion.time());
+    const auto now = Now::at(motion.time());
     for (std::size_t i = ids.size(); i-- > 1;) this->start(ids[i], now);
     std::uint32_t open = Base::all_sides;
     for (std::uint32_t node = top; open != 0; node = topology_.parents[node]) {
@@ -242,7 +243,7 @@ class KineticBoxTree : public BoxTreeCertificates<S, Queue, Observer> {
   /// whether a realiser has a new plan.
   template <class Changed>
   void repair(double t, Changed&& changed) {
-    const auto now = Instant<S>::at(t);
+    const auto now = Now::at(t);
     affected_.clear();
     if (!topology_.empty() && concerned_[0] != 0) affected_.push_back(0);
     for (std::size_t i = 0; i < affected_.size(); ++i) {

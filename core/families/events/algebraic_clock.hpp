@@ -10,6 +10,7 @@
 #include "core/families/events/curve_rows.hpp"
 #include "core/families/events/event.hpp"
 #include "core/motion/curve_roots.hpp"
+#include "core/motion/round_curve.hpp"
 
 namespace kbvh {
 
@@ -43,16 +44,28 @@ class AlgebraicClock {
   using ExactTime = AlgebraicInstant<S>;
   using Now = Instant<S, ExactTime>;
 
-  /// Only for the sides of boxes: `directions` are the axes.
+  /// Along the axes certificates compare the flight plans, along other directions the projected plans.
   explicit AlgebraicClock(std::vector<const FlightPlans<S>*> plans,
                           std::span<const SlabDirection> directions = Dop<S, 6>::directions)
-      : lines_(plans, directions), plans_(std::move(plans)), rows_(plans_.size()) {
-    KBVH_ASSERT(directions.size() == 3);
-  }
+      : lines_(plans, directions), plans_(std::move(plans)), directions_(directions), rows_(plans_.size()) {}
 
   const FlightPlans<S>& plans(std::uint32_t body) const { return *plans_[body]; }
   bool on_curves(std::uint32_t body) const { return plans_[body]->curved(); }
   std::vector<double> keyframe_times() const { return lines_.keyframe_times(); }
+  /// Does the same as EventClock::values_at.
+  void values_at(std::uint32_t body, const std::uint32_t* realisers, std::size_t count, double t,
+                 S* values) const {
+    if (!on_curves(body)) return lines_.values_at(body, realisers, count, t, values);
+    const CurveRows<S>& rows = rows_[body];
+    const auto times = rows.times();
+    const std::size_t k = plans_[body]->segment_at(t);
+    const bool at_rest = t < times.front() || k + 1 == times.size();
+    for (Side side = 0; side < count; ++side) {
+      const std::size_t direction = direction_of(side);
+      values[side] = at_rest ? rows.value(realisers[side], direction, k)
+                             : round_piece(rows.piece(realisers[side], direction, k), t);
+    }
+  }
 
   /// Returns the exact time of an event.
   ExactTime crossing(const Event& event) const {
@@ -114,12 +127,12 @@ class AlgebraicClock {
     own_crossing.reset();
     const CurveRows<S>& rows = rows_[event.body];
     const auto times = rows.times();
-    const auto axis = std::size_t(axis_of(event.side));
+    const std::size_t direction = direction_of(event.side);
     const std::uint32_t ahead = is_upper(event.side) ? event.loser : event.winner,
                         behind = is_upper(event.side) ? event.winner : event.loser;
     const std::size_t first = segment_of(event.body, now);
     for (std::size_t k = first; k + 1 < times.size() && (k == first || times[k] < until); ++k) {
-      const CurvedPiece<S> a = rows.piece(ahead, axis, k), b = rows.piece(behind, axis, k);
+      const CurvedPiece<S> a = rows.piece(ahead, direction, k), b = rows.piece(behind, direction, k);
       const SegmentRoots found = segment_roots(a, b);
       for (int i = 0; i < found.count; ++i) {
         const CurveRoot& root = found.roots[i];
@@ -142,14 +155,14 @@ class AlgebraicClock {
     if (!on_curves(body)) return lines_.compare_values(body, side, challenger, winner, t);
     const CurveRows<S>& rows = rows_[body];
     const auto times = rows.times();
-    const auto axis = std::size_t(axis_of(side));
+    const std::size_t direction = direction_of(side);
     const std::size_t k = plans_[body]->segment_at(t);
     int sign = 0;
     if (t < times.front() || k + 1 == times.size()) {
-      const S x = rows.value(challenger, axis, k), y = rows.value(winner, axis, k);
+      const S x = rows.value(challenger, direction, k), y = rows.value(winner, direction, k);
       sign = (x > y) - (x < y);
     } else {
-      sign = compare_at(rows.piece(challenger, axis, k), rows.piece(winner, axis, k), t);
+      sign = compare_at(rows.piece(challenger, direction, k), rows.piece(winner, direction, k), t);
     }
     return is_upper(side) ? sign : -sign;
   }
@@ -162,10 +175,10 @@ class AlgebraicClock {
     const int order = compare_times(a, b);
     if (order != 0) return order < 0;
     const CurveRows<S>& rows = rows_[a.body];
-    const auto axis = std::size_t(axis_of(a.side));
+    const std::size_t direction = direction_of(a.side);
     const std::size_t k = segment_number(a);
-    const int ahead =
-        compare_after_moment(rows.piece(a.loser, axis, k), rows.piece(b.loser, axis, k), moment_of(a));
+    const int ahead = compare_after_moment(rows.piece(a.loser, direction, k),
+                                           rows.piece(b.loser, direction, k), moment_of(a));
     return is_upper(a.side) ? ahead > 0 : ahead < 0;
   }
 
@@ -175,7 +188,7 @@ class AlgebraicClock {
   void start() {
     lines_.start();
     for (std::uint32_t body = 0; body < plans_.size(); ++body)
-      if (on_curves(body)) rows_[body].copy(*plans_[body]);
+      if (on_curves(body)) rows_[body].copy(*plans_[body], directions_);
   }
   std::size_t bytes() const {
     std::size_t total = lines_.bytes();
@@ -195,9 +208,10 @@ class AlgebraicClock {
   }
   CurveMoment<S> moment_of(const Event& event) const {
     const CurveRows<S>& rows = rows_[event.body];
-    const auto axis = std::size_t(axis_of(event.side));
+    const std::size_t direction = direction_of(event.side);
     const std::size_t k = segment_number(event);
-    return {rows.piece(event.loser, axis, k), rows.piece(event.winner, axis, k), event.segment >> root_shift};
+    return {rows.piece(event.loser, direction, k), rows.piece(event.winner, direction, k),
+            event.segment >> root_shift};
   }
   /// Returns whether a root in the segment that contains `now` comes before it.
   static bool is_past(const CurveMoment<S>& moment, const CurveRoot& root, const Now& now) {
@@ -217,6 +231,7 @@ class AlgebraicClock {
 
   EventClock<S> lines_;
   std::vector<const FlightPlans<S>*> plans_;
+  std::span<const SlabDirection> directions_;
   std::vector<CurveRows<S>> rows_;  ///< [body]; empty for bodies without curves
 };
 

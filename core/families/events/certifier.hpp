@@ -95,8 +95,10 @@ class Certifier {
     if (scheduled) {
       const Event next = queue_->event(event.slot);
       const FlightPlans<S>& plans = clock_->plans(event.body);
-      if (plans.has_own_plan(next.winner) || plans.has_own_plan(next.loser))
-        next_crossing = clock_->crossing(next);
+      if (plans.has_own_plan(next.winner) || plans.has_own_plan(next.loser)) {
+        const auto exact = clock_->crossing(next);
+        if (const Crossing<S>* const of_lines = crossing_in(exact)) next_crossing = *of_lines;
+      }
       if (!clock_->overtakes_first(event, own_crossing, next, next_crossing)) return;
     } else if (own_crossing && !std::isinf(until) && compare_crossing_to(*own_crossing, until) >= 0) {
       return;  // the review, which checks all candidates, comes first

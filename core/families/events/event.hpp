@@ -75,6 +75,12 @@ struct Instant {
   static Instant at(double t) { return {t, t, nullptr}; }
 };
 
+/// Returns the crossing of linear pieces by which a clock states an exact time; null if it is another form.
+template <class S>
+const Crossing<S>* crossing_in(const Crossing<S>& exact) {
+  return &exact;
+}
+
 /// The instants of a clock: of crossings, unless the clock names another form of exact times.
 template <class Clock, class S>
 struct InstantOf {

@@ -30,12 +30,6 @@ class WatchedEvent {
   BoundWatch<S>* watch_;
 };
 
-/// Returns the crossing of linear pieces by which a clock states an exact time; null if it is another form.
-template <class S>
-const Crossing<S>* crossing_in(const Crossing<S>& exact) {
-  return &exact;
-}
-
 /// An observer of kinetic trees (see NoObserver in observer.hpp) that writes changes of bounds to the logs of
 /// `watch`.
 template <class S>

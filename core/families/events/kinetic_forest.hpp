@@ -9,6 +9,14 @@
 
 namespace kbvh {
 
+/// Returns whether a body of the scene moves on curves: its forest then needs an AlgebraicClock.
+template <class S>
+bool any_on_curves(const SceneView<S>& scene, const ClipMotion<S>& motion) {
+  for (std::uint32_t body = 0; body < scene.body_count(); ++body)
+    if (motion.plans(body).curved()) return true;
+  return false;
+}
+
 /// The kinetic trees of all bodies of a scene on one event queue. KineticTree is the kind of tree: AABB
 /// trees, k-DOP trees (KineticDop), or others with the same interface.
 template <class S, class Queue, class Observer = NoObserver,

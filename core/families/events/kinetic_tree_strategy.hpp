@@ -26,7 +26,7 @@ enum class KineticQuery : std::uint8_t {
 
 /// A strategy of kinetic trees (Z&W s.4) alone: queries compute volumes from the realisers. `Forests` are the
 /// selectable kinds of KineticForest, of boxes or of k-DOPs. The clock of a forest's queue decides about
-/// events; k-DOPs need an EventClock. Queries of k-DOPs go node by node.
+/// events; k-DOPs need an EventClock or an AlgebraicClock. Queries of k-DOPs go node by node.
 template <class S, class... Forests>
 class KineticTreeStrategy : public CountedStrategy<S>, public AnswersProbes<S> {
   /// A forest, and the volumes of its trees at the current frame.
@@ -34,7 +34,8 @@ class KineticTreeStrategy : public CountedStrategy<S>, public AnswersProbes<S> {
   struct Kind {
     static constexpr int sides = ForestType::Tree::sides;
     static constexpr bool boxes = sides == 6;
-    using Volumes = std::conditional_t<boxes, BoxCache<S>, RealiserDops<S, sides>>;
+    using Volumes =
+        std::conditional_t<boxes, BoxCache<S>, RealiserDops<S, sides, typename ForestType::Clock>>;
     template <class... Arguments>
     explicit Kind(Arguments&&... arguments) : forest(std::forward<Arguments>(arguments)...) {
       for (std::uint32_t body = 0; body < forest.size(); ++body)
@@ -287,8 +288,8 @@ class KineticTreeStrategy : public CountedStrategy<S>, public AnswersProbes<S> {
   std::uint64_t first_step_ = 0;
 };
 
-/// A KineticTreeStrategy on exact clocks (EventClock): plans and geometry may change, and events can be
-/// stepped.
+/// A KineticTreeStrategy on exact clocks (EventClock, AlgebraicClock): plans and geometry may change, and
+/// events can be stepped.
 template <class S, class... Forests>
 class ExactKineticTreeStrategy : public KineticTreeStrategy<S, Forests...>,
                                  public EventSource<S>,

@@ -10,9 +10,10 @@
 
 // The motion of a vertex along a fixed direction n, as kinetic trees see it. Along an axis it is the flight
 // plan of a coordinate. Along another direction it is the projected plan: n . x of the stored positions (and
-// velocities), rounded once to the scalar, and linear in between. Certificates, events and their order are
-// exact for the projected plan. It differs from the projection of the exact plan by rounding, so bounds that
-// are read from it are widened by a ProjectionMargin.
+// velocities), rounded once to the scalar, and linear in between. A curve's coefficients are projected in the
+// same way. Certificates, events and their order are exact for the projected plan. It differs from the
+// projection of the exact plan by rounding, so bounds that are read from it are widened by a
+// ProjectionMargin.
 
 namespace kbvh {
 
@@ -49,15 +50,28 @@ Piece<S> projected_piece(const FlightPlans<S>& plans, std::uint32_t vertex, cons
 ///   q_v <= q_w                 w realises the side
 ///   q_w <= RN(q_w) + u R       the value of the plan is rounded
 /// The margin is 5 u R, plus as many least numbers of S as underflow may cost.
+///
+/// On a curve (curved_piece.hpp) the weights of bend and twist, s (1 - s) and s^2 (1 - s), are at most 1/4.
+/// With R = |x|_1 at the ends + (|bend|_1 + |twist|_1) / 4 every line above holds: the four coefficients of q
+/// are rounded by at most 2 u of their magnitude each.
 template <class S>
 class ProjectionMargin {
  public:
-  /// Takes R from the keyframes alone. O(keyframes). Must precede the other calls.
+  /// Takes R from the keyframes alone, and from the curves between them. O(keyframes). Must precede the other
+  /// calls.
   void start_over(const FlightPlans<S>& plans) {
     keyframed_ = 0;
-    for (std::size_t k = 0; k < plans.keyframe_count(); ++k)
-      for (std::size_t v = 0; v < plans.keyframed_count(); ++v)
-        keyframed_ = std::max(keyframed_, length(plans.keyframe(k) + 3 * v));
+    for (std::size_t k = 0; k < plans.keyframe_count(); ++k) {
+      const bool bent = plans.curved_in(k);
+      const S *const bend = bent ? plans.bends(k) : nullptr, *const twist = bent ? plans.twists(k) : nullptr;
+      for (std::size_t v = 0; v < plans.keyframed_count(); ++v) {
+        double reach = length(plans.keyframe(k) + 3 * v);
+        if (bent) reach = std::max(reach, length(plans.keyframe(k + 1) + 3 * v));
+        for (const S* const coefficients : {bend, twist})
+          if (coefficients != nullptr) reach += 0.25 * length(coefficients + 3 * v);
+        keyframed_ = std::max(keyframed_, reach);
+      }
+    }
     own_reach_ = speed_ = 0;
     since_ = std::numeric_limits<double>::infinity();
   }

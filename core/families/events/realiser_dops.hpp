@@ -14,9 +14,9 @@ namespace kbvh {
 /// direction 1, ...]. Sides along the axes are those of the vertices' positions, exactly; the other sides are
 /// at most `margin` (ProjectionMargin::at) and an ulp further out, so that they contain the positions of all
 /// vertices that the realisers stand for.
-template <class S, int K>
-Dop<S, K> dop_of_realisers(const std::uint32_t* realisers, const EventClock<S>& clock, std::uint32_t body,
-                           double t, double margin) {
+template <class S, int K, class Clock>
+Dop<S, K> dop_of_realisers(const std::uint32_t* realisers, const Clock& clock, std::uint32_t body, double t,
+                           double margin) {
   S values[K];
   clock.values_at(body, realisers, K, t, values);
   Dop<S, K> dop;
@@ -30,11 +30,11 @@ Dop<S, K> dop_of_realisers(const std::uint32_t* realisers, const EventClock<S>& 
 }
 
 /// The k-DOPs of one body's kinetic tree as queries read them: computed from the realisers on demand, each at
-/// most once per frame.
-template <class S, int K>
+/// most once per frame. The clock is an EventClock or an AlgebraicClock.
+template <class S, int K, class Clock = EventClock<S>>
 class RealiserDops {
  public:
-  RealiserDops(const EventClock<S>& clock, std::uint32_t body, std::uint32_t nodes)
+  RealiserDops(const Clock& clock, std::uint32_t body, std::uint32_t nodes)
       : clock_(&clock), body_(body), cache_(nodes) {}
 
   /// Begins a clip: measures the keyframes, and forgets the vertices' own plans.
@@ -66,7 +66,7 @@ class RealiserDops {
     return dop_of_realisers<S, K>(realisers_ + std::size_t(K) * node, *clock_, body_, time_, margin_now_);
   }
 
-  const EventClock<S>* clock_;
+  const Clock* clock_;
   std::uint32_t body_;
   ProjectionMargin<S> margin_;
   VolumeCache<Dop<S, K>> cache_;
@@ -76,10 +76,10 @@ class RealiserDops {
 
 /// A bounds view of the k-DOPs that reads only the sides along the axes: tight boxes, for pairs of primitives
 /// that are answered by their boxes.
-template <class S, int K>
+template <class S, int K, class Clock>
 class BoxesOfDops {
  public:
-  explicit BoxesOfDops(RealiserDops<S, K>& dops) : dops_(&dops) {}
+  explicit BoxesOfDops(RealiserDops<S, K, Clock>& dops) : dops_(&dops) {}
   void ensure(std::uint32_t node) { dops_->ensure(node); }
   Box<S> operator()(std::uint32_t node) const {
     const Dop<S, K>& dop = (*dops_)(node);
@@ -92,7 +92,7 @@ class BoxesOfDops {
   }
 
  private:
-  RealiserDops<S, K>* dops_;
+  RealiserDops<S, K, Clock>* dops_;
 };
 
 }  // namespace kbvh

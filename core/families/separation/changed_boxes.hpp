@@ -26,9 +26,9 @@ struct ChangedBoxes {
   std::vector<Box>* boxes;
   std::vector<Node>* nodes;
 
-  template <class S>
+  template <class S, class Exact>
   void realiser_changed(std::uint32_t body, std::uint32_t node, Side side, std::uint32_t /*old_vertex*/,
-                        std::uint32_t /*new_vertex*/, const Instant<S>& /*now*/) {
+                        std::uint32_t /*new_vertex*/, const Instant<S, Exact>& /*now*/) {
     boxes->push_back({body, node, side});
   }
   void realiser_plan_changed(std::uint32_t body, std::uint32_t node) { boxes->push_back({body, node}); }
@@ -50,9 +50,9 @@ struct WatchedBoxes : ChangedBoxes {
 
   bool reads_instants() const { return bounds.reads_instants(); }
 
-  template <class T>
+  template <class T, class Exact>
   void realiser_changed(std::uint32_t body, std::uint32_t node, Side side, std::uint32_t old_vertex,
-                        std::uint32_t new_vertex, const Instant<T>& now) {
+                        std::uint32_t new_vertex, const Instant<T, Exact>& now) {
     ChangedBoxes::realiser_changed(body, node, side, old_vertex, new_vertex, now);
     bounds.realiser_changed(body, node, side, old_vertex, new_vertex, now);
   }

@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <limits>
 #include <vector>
+
+#include "core/families/events/algebraic_clock.hpp"
 #include "core/families/separation/separation_list.hpp"
 #include "core/families/wide/near_bodies.hpp"
 
@@ -10,17 +12,21 @@ namespace kbvh {
 /// Kinetic incremental collision detection (Z&W s.7): the kinetic AABB trees of a scene, and the separation
 /// lists of its body pairs on top. Trees and lists advance together, in the exact order of their events.
 /// `Queue` is a queue over a clock (event_queue.hpp). The trees share one queue and the lists share another;
-/// the first events of both queues are compared exactly.
+/// the first events of both queues are compared exactly. `Clock` decides about the trees' events: an
+/// AlgebraicClock if bodies move on curves. The list compares boxes that are linear between keyframes
+/// (CurveHulls).
 ///
 /// In scenes with many body pairs the list holds only the pairs that may meet within a time window. Each body
 /// has an upper bound on the displacement of its vertices; two bodies whose distance exceeds both
 /// displacements do not meet. The end of a window is an event that opens the next window. A window is halved
 /// while it holds many more pairs than bodies plus pairs that meet at its begin. The next window is twice as
 /// long if the current one holds few pairs.
-template <class S, template <class> class Queue>
+template <class S, template <class> class Queue, class Clock = EventClock<S>>
 class KineticCollision {
+  using ExactTime = typename InstantOf<Clock, S>::type::Exact;
+
  public:
-  using Forest = KineticForest<S, Queue<EventClock<S>>, WatchedBoxes<S>>;
+  using Forest = KineticForest<S, Queue<Clock>, WatchedBoxes<S>>;
   using List = SeparationList<S, Queue>;
 
   /// `queue` names the kind of both queues, where `Queue` offers a choice.
@@ -133,7 +139,8 @@ class KineticCollision {
 
   /// Prefetches for the queue of the trees: the data that the forest reads at `event`, and the data that the
   /// list reads.
-  void fetch_ahead(const PackedEvent& event, std::uint32_t slot, int step) const {
+  template <class StoredEvent>
+  void fetch_ahead(const StoredEvent& event, std::uint32_t slot, int step) const {
     forest_.fetch_ahead(event, slot, step);
     const auto& tree = forest_.tree(event.body);
     const std::uint32_t node = tree.node_of(slot);
@@ -193,7 +200,7 @@ class KineticCollision {
     const double error = tree.error + pair.error;
     if (tree.hint + error < pair.hint) return Part::trees;
     if (pair.hint + error < tree.hint) return Part::list;
-    return compare_crossings(forest_.clock().crossing(tree), pair.crossing) <= 0 ? Part::trees : Part::list;
+    return compare(forest_.clock().crossing(tree), pair.crossing) <= 0 ? Part::trees : Part::list;
   }
   /// Returns whether the first event of `first`, which owns the earliest event, is due.
   bool is_due(Part first, double t) const {
@@ -225,19 +232,39 @@ class KineticCollision {
     const Event& event = forest_.queue().top();
     if (event.hint + event.error < t) return true;
     if (event.hint - event.error > t) return false;
-    return compare_crossing_to(forest_.clock().crossing(event), t) < 0;
+    return compare(forest_.clock().crossing(event), t) < 0;
+  }
+  /// Return the sign of an exact time of a tree event minus the time of a pair event, or a double.
+  static int compare(const Crossing<S>& tree, const Crossing<S>& pair) {
+    return compare_crossings(tree, pair);
+  }
+  static int compare(const Crossing<S>& tree, double t) { return compare_crossing_to(tree, t); }
+  template <class Other>
+  static int compare(const AlgebraicInstant<S>& tree, const Other& other) {
+    return tree.curved ? compare_moment_to(tree.moment, other) : compare(tree.crossing, other);
+  }
+  /// Returns the instant at which the list decides pairs again, after an event of a tree. On curves this is a
+  /// double before the event, in its segment: a pair that changes between that double and the event has its
+  /// own event at once.
+  static Moment<S> moment_of(const Event& event, const Crossing<S>& exact) {
+    return {{event.begin, event.end, &exact}, event.hint, event.error};
+  }
+  static Moment<S> moment_of(const Event& event, const AlgebraicInstant<S>& exact) {
+    if (!exact.curved) return moment_of(event, exact.crossing);
+    const double before = std::max(event.begin, std::nextafter(event.hint - event.error, -never));
+    return {{before, std::nextafter(event.hint + event.error, never), nullptr}, before, 0};
   }
   void handle_tree_event() {
     const Event event = forest_.queue().top();
     // For a body with per-vertex plans the clock drops an event's crossing when the event is handled.
     const bool own = forest_.clock().plans(event.body).has_own_plans();
-    Crossing<S> crossing;
-    if (own) crossing = forest_.clock().crossing(event);
+    ExactTime exact;
+    if (own) exact = forest_.clock().crossing(event);
     changed_.clear();
     forest_.handle_next();
     if (!list_.take_over(changed_)) return;
-    if (!own) crossing = forest_.clock().crossing(event);
-    list_.boxes_changed(changed_, {{event.begin, event.end, &crossing}, event.hint, event.error});
+    if (!own) exact = forest_.clock().crossing(event);
+    list_.boxes_changed(changed_, moment_of(event, exact));
   }
 
   static ScheduledEvent<S> without_change(double t) {
@@ -266,8 +293,11 @@ class KineticCollision {
     if (tree.topology().empty()) return box;
     for (int axis = 0; axis < 3; ++axis)
       for (const bool upper : {false, true}) {
-        const std::uint32_t vertex = tree.realiser(0, Side(2 * axis + (upper ? 1 : 0)));
-        const Piece<S> piece = forest_.clock().plans(body).piece_after(vertex, axis, t);
+        const Side side = Side(2 * axis + (upper ? 1 : 0));
+        const FlightPlans<S>& plans = forest_.clock().plans(body);
+        const Piece<S> piece = plans.curved()
+                                   ? list_.box(body, 0).walk(side, Widening::none, Instant<S>::at(t)).piece()
+                                   : plans.piece_after(tree.realiser(0, side), axis, t);
         const double x0 = double(piece.x0), x1 = double(piece.x1);
         const double way = piece.kind == PieceKind::ray
                                ? x1 * (t - piece.t0)

@@ -39,9 +39,11 @@ S widened_up(S x) {
 template <class S>
 class PieceWalk {
  public:
-  PieceWalk(const FlightPlans<S>& plans, std::uint32_t vertex, int axis, Widening widening,
-            const Instant<S>& now)
+  /// Reads `keyframes` ([keyframe][vertex][3]) in place of those of the plans unless it is null.
+  PieceWalk(const FlightPlans<S>& plans, const S* keyframes, std::uint32_t vertex, int axis,
+            Widening widening, const Instant<S>& now)
       : plans_(&plans),
+        keyframes_(keyframes),
         vertex_(vertex),
         axis_(axis),
         widening_(widening),
@@ -73,6 +75,7 @@ class PieceWalk {
   void take(double t) {
     if (own_ || t < times_[0]) {
       piece_ = plans_->piece_after(vertex_, axis_, t);
+      if (!own_) piece_.x0 = value(0);
       segment_ = before_first;
       widen();
     } else {
@@ -80,15 +83,18 @@ class PieceWalk {
     }
   }
   void take_segment(std::size_t k) {
-    const std::size_t at = std::size_t(3) * vertex_ + std::size_t(axis_);
     segment_ = k;
     if (k + 1 < times_.size())
-      piece_ = {times_[k], times_[k + 1], plans_->keyframe(k)[at], plans_->keyframe(k + 1)[at],
-                PieceKind::chord};
+      piece_ = {times_[k], times_[k + 1], value(k), value(k + 1), PieceKind::chord};
     else
-      piece_ = {times_[k], std::numeric_limits<double>::infinity(), plans_->keyframe(k)[at], S(0),
-                PieceKind::ray};
+      piece_ = {times_[k], std::numeric_limits<double>::infinity(), value(k), S(0), PieceKind::ray};
     widen();
+  }
+  /// Returns the coordinate at keyframe k.
+  S value(std::size_t k) const {
+    const S* const keyframe =
+        keyframes_ == nullptr ? plans_->keyframe(k) : keyframes_ + 3 * k * plans_->keyframed_count();
+    return keyframe[std::size_t(3) * vertex_ + std::size_t(axis_)];
   }
   void widen() {
     if (widening_ == Widening::none) return;
@@ -99,6 +105,7 @@ class PieceWalk {
   S widened(S x) const { return widening_ == Widening::up ? widened_up(x) : -widened_up(-x); }
 
   const FlightPlans<S>* plans_;
+  const S* keyframes_;
   std::uint32_t vertex_;
   int axis_;
   Widening widening_;
@@ -108,11 +115,18 @@ class PieceWalk {
   Piece<S> piece_;
 };
 
-/// A box given by the six vertices that realise its sides now: [lower x, upper x, lower y, ...].
+/// A box given by the six vertices that realise its sides now: [lower x, upper x, lower y, ...]. In a body on
+/// curves the sides follow the chains of CurveHulls.
 template <class S>
 struct RealisedBox {
   const FlightPlans<S>* plans;
   const std::uint32_t* realisers;
+  const S *lower = nullptr, *upper = nullptr;  ///< chains; null: the plans
+
+  /// Returns the walk of a side's realiser.
+  PieceWalk<S> walk(Side side, Widening widening, const Instant<S>& now) const {
+    return {*plans, is_upper(side) ? upper : lower, realisers[side], axis_of(side), widening, now};
+  }
 };
 
 /// The instant at which two boxes begin or cease to overlap: a crossing of two pieces, within `error` of
@@ -253,12 +267,10 @@ class OverlapClock {
    public:
     Gap(const RealisedBox<S>& a, const RealisedBox<S>& b, int side, const Instant<S>& now)
         : axis_(side / 2),
-          upper_(side % 2 == 0
-                     ? PieceWalk<S>(*a.plans, a.realisers[2 * axis_ + 1], axis_, Widening::up, now)
-                     : PieceWalk<S>(*b.plans, b.realisers[2 * axis_ + 1], axis_, Widening::none, now)),
-          lower_(side % 2 == 0 ? PieceWalk<S>(*b.plans, b.realisers[2 * axis_], axis_, Widening::none, now)
-                               : PieceWalk<S>(*a.plans, a.realisers[2 * axis_], axis_, Widening::down, now)) {
-    }
+          upper_(side % 2 == 0 ? a.walk(Side(2 * axis_ + 1), Widening::up, now)
+                               : b.walk(Side(2 * axis_ + 1), Widening::none, now)),
+          lower_(side % 2 == 0 ? b.walk(Side(2 * axis_), Widening::none, now)
+                               : a.walk(Side(2 * axis_), Widening::down, now)) {}
 
     /// Returns the sign of the gap right after `now`, at which the walk stands.
     int sign_after(const Instant<S>& now) const {

@@ -33,7 +33,10 @@ class PairOutlook {
   template <class Forest>
   PairOutlook(const SceneView<S>& scene, const Forest& forest, const PairTree& tree, LookAhead look_ahead,
               int pieces)
-      : clock_(pieces), tree_(&tree), boxes_(plans_of(scene, forest), scene.pairs()) {
+      : clock_(pieces),
+        tree_(&tree),
+        hulls_(plans_of(scene, forest)),
+        boxes_(plans_of(scene, forest), scene.pairs(), hulls_) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body)
       bodies_.push_back({nullptr, &forest.clock().plans(body)});
     by_segments_ = look_ahead == LookAhead::segment && boxes_.usable();
@@ -41,7 +44,8 @@ class PairOutlook {
 
   const OverlapClock<S>& clock() const { return clock_; }
   RealisedBox<S> box(std::uint32_t body, std::uint32_t node) const {
-    return {bodies_[body].plans, bodies_[body].realisers + std::size_t(6) * node};
+    return {bodies_[body].plans, bodies_[body].realisers + std::size_t(6) * node, hulls_.lower(body),
+            hulls_.upper(body)};
   }
 
   /// Rereads the addresses of the trees' realisers, and makes room for all their nodes.
@@ -55,6 +59,7 @@ class PairOutlook {
   }
   /// Restarts at t.
   void start(double t) {
+    hulls_.start();
     if (by_segments_) boxes_.start(t);
   }
   /// Returns the end of the current segment; infinite if there is none.
@@ -121,9 +126,10 @@ class PairOutlook {
   /// Returns the gaps (SegmentOverlap) that a changed box may have shrunk, seen from the pairs that have the
   /// box on the given side. Between changes of plans, a new realiser is ahead of the old one until the
   /// segment ends. It can therefore shrink a gap only by the rounding of the inflation, or before the current
-  /// time. In a body with plans of its own, any gap may shrink or grow.
+  /// time. In a body with plans of its own, or on curves, any gap may shrink or grow.
   std::uint8_t changed_gaps(const ChangedBoxes::Box& box, int side) const {
-    if (!by_segments_ || box.side == ChangedBoxes::all_sides || bodies_[box.body].plans->has_own_plans())
+    const FlightPlans<S>& plans = *bodies_[box.body].plans;
+    if (!by_segments_ || box.side == ChangedBoxes::all_sides || plans.has_own_plans() || plans.curved())
       return all_reasons;
     return std::uint8_t(1U << SegmentBoxes<S>::lane_of(BoxRole(side), box.side));
   }
@@ -160,7 +166,7 @@ class PairOutlook {
   /// Returns the event of the last pair that `predict` examined. Valid only if the state of the pair changes.
   const OverlapEvent<S>& event() const { return event_; }
 
-  std::size_t bytes() const { return boxes_.bytes() + gaps_.capacity(); }
+  std::size_t bytes() const { return boxes_.bytes() + hulls_.bytes() + gaps_.capacity(); }
 
  private:
   struct BodyPlans {
@@ -186,6 +192,7 @@ class PairOutlook {
 
   OverlapClock<S> clock_;
   const PairTree* tree_;
+  CurveHulls<S> hulls_;
   SegmentBoxes<S> boxes_;
   bool by_segments_ = false;
   std::vector<BodyPlans> bodies_;

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "core/families/separation/curve_hulls.hpp"
 #include "core/families/separation/overlap_clock.hpp"
 #include "core/scene/scene.hpp"
 
@@ -33,15 +34,16 @@ static_assert(sizeof(SegmentBox<float>) == 64);
 enum class BoxRole : std::uint8_t { first, second };
 
 /// The boxes of all nodes over the segment between two keyframes, from the vertices that currently realise
-/// their sides. Requires that all moving bodies have the same keyframe times. If a realiser has its own plan,
-/// all numbers of the box are NaN. A box is computed when it is read. A side with a new realiser is
-/// recomputed at once.
+/// their sides; in a body on curves, from the chains of CurveHulls at the places of these vertices. Requires
+/// that all moving bodies have the same keyframe times. If a realiser has its own plan, all numbers of the
+/// box are NaN. A box is computed when it is read. A side with a new realiser is recomputed at once.
 template <class S>
 class SegmentBoxes {
  public:
   /// Reserves the roles that the bodies have in the scene's pairs. follow_tree makes room for their boxes.
-  SegmentBoxes(std::vector<const FlightPlans<S>*> plans, std::span<const BodyPair> pairs)
-      : bodies_(plans.size()) {
+  SegmentBoxes(std::vector<const FlightPlans<S>*> plans, std::span<const BodyPair> pairs,
+               const CurveHulls<S>& hulls)
+      : hulls_(&hulls), bodies_(plans.size()) {
     for (std::size_t body = 0; body < plans.size(); ++body) {
       bodies_[body].plans = plans[body];
       bodies_[body].at_rest = plans[body]->keyframe_count() < 2;
@@ -95,7 +97,8 @@ class SegmentBoxes {
       for (std::uint32_t node = 0; node < nodes; ++node) {
         if (node + ahead < nodes && wanted(node + ahead))
           for (std::size_t lane = 0; lane < 6; ++lane)
-            __builtin_prefetch(own.last + 3 * std::size_t(realiser(own, BoxRole(role), node + ahead, lane)));
+            __builtin_prefetch(own.last[bound_of(BoxRole(role), lane)] +
+                               3 * std::size_t(realiser(own, BoxRole(role), node + ahead, lane)));
         if (wanted(node)) box(body, BoxRole(role), node);
       }
     }
@@ -116,8 +119,10 @@ class SegmentBoxes {
   void prefetch_vertex(std::uint32_t body, std::uint32_t vertex) const {
     const Body& own = bodies_[body];
     if (vertex >= own.plans->keyframed_count()) return;
-    __builtin_prefetch(own.first + 3 * std::size_t(vertex));
-    __builtin_prefetch(own.last + 3 * std::size_t(vertex));
+    for (const std::size_t bound : {0, 1}) {
+      __builtin_prefetch(own.first[bound] + 3 * std::size_t(vertex));
+      __builtin_prefetch(own.last[bound] + 3 * std::size_t(vertex));
+    }
   }
   /// Returns the lane of a side.
   static std::size_t lane_of(BoxRole role, Side side) { return role == BoxRole::first ? side ^ 1U : side; }
@@ -162,7 +167,8 @@ class SegmentBoxes {
     bool at_rest = false;                               ///< has no motion apart from per-vertex plans
     std::array<bool, 2> takes_part{};                   ///< [role]
     std::array<std::vector<SegmentBox<S>>, 2> boxes{};  ///< [role][node]
-    const S *first = nullptr, *last = nullptr;          ///< keyframes at the ends of the segment
+    /// Keyframes at the ends of the segment, for lower and for upper bounds.
+    std::array<const S*, 2> first{}, last{};
   };
 
   void go_to(std::size_t segment) {
@@ -170,10 +176,18 @@ class SegmentBoxes {
     stamp_ = S(segment + 2);
     begin_ = segment == 0 ? -infinity : times_[segment - 1];
     end_ = segment == times_.size() ? infinity : times_[segment];
-    for (Body& body : bodies_) {
+    for (std::uint32_t index = 0; index < bodies_.size(); ++index) {
+      Body& body = bodies_[index];
       const std::size_t last_keyframe = body.plans->keyframe_count() - 1;
-      body.first = body.plans->keyframe(body.at_rest || segment == 0 ? 0 : segment - 1);
-      body.last = body.plans->keyframe(body.at_rest ? 0 : std::min(segment, last_keyframe));
+      const S* const chains[2] = {hulls_->lower(index), hulls_->upper(index)};
+      for (const std::size_t bound : {0, 1}) {
+        const auto keyframe = [&](std::size_t k) {
+          return chains[bound] == nullptr ? body.plans->keyframe(k)
+                                          : chains[bound] + 3 * k * body.plans->keyframed_count();
+        };
+        body.first[bound] = keyframe(body.at_rest || segment == 0 ? 0 : segment - 1);
+        body.last[bound] = keyframe(body.at_rest ? 0 : std::min(segment, last_keyframe));
+      }
     }
   }
   /// Returns the stamp of an up-to-date box. A resting body has the same stamp in all segments.
@@ -185,23 +199,30 @@ class SegmentBoxes {
     if (role == BoxRole::second) return lane % 2 == 0 ? -x : x;
     return widened_up(lane % 2 == 0 ? x : S(-x));
   }
+  static std::size_t side_of(BoxRole role, std::size_t lane) {
+    return role == BoxRole::first ? lane ^ 1U : lane;
+  }
+  /// Returns whether a lane holds lower (0) or upper bounds (1).
+  static std::size_t bound_of(BoxRole role, std::size_t lane) { return side_of(role, lane) & 1U; }
   static std::uint32_t realiser(const Body& body, BoxRole role, std::uint32_t node, std::size_t lane) {
-    return body.realisers[6 * std::size_t(node) + (role == BoxRole::first ? lane ^ 1U : lane)];
+    return body.realisers[6 * std::size_t(node) + side_of(role, lane)];
   }
   void read_lane(const Body& body, BoxRole role, std::uint32_t node, std::size_t lane,
                  SegmentBox<S>& box) const {
     const std::uint32_t vertex = realiser(body, role, node, lane);
-    box.at[0][lane] = value(body.first, vertex, role, lane);
-    box.at[1][lane] = body.at_rest ? box.at[0][lane] : value(body.last, vertex, role, lane);
+    const std::size_t bound = bound_of(role, lane);
+    box.at[0][lane] = value(body.first[bound], vertex, role, lane);
+    box.at[1][lane] = body.at_rest ? box.at[0][lane] : value(body.last[bound], vertex, role, lane);
   }
   static bool has_own_plan(const Body& body, std::uint32_t node) {
     const std::uint32_t* const realisers = body.realisers + 6 * std::size_t(node);
     return std::any_of(realisers, realisers + 6,
                        [&](std::uint32_t vertex) { return body.plans->has_own_plan(vertex); });
   }
-  static void read_all(const Body& body, const S* keyframe, BoxRole role, std::uint32_t node, S* to) {
+  static void read_all(const Body& body, const std::array<const S*, 2>& keyframe, BoxRole role,
+                       std::uint32_t node, S* to) {
     for (std::size_t lane = 0; lane < 6; ++lane)
-      to[lane] = value(keyframe, realiser(body, role, node, lane), role, lane);
+      to[lane] = value(keyframe[bound_of(role, lane)], realiser(body, role, node, lane), role, lane);
   }
   void make(const Body& body, BoxRole role, std::uint32_t node, SegmentBox<S>& box) const {
     // The values at the end of the previous segment are those at the begin of this one.
@@ -222,6 +243,7 @@ class SegmentBoxes {
     box.at[1][SegmentBox<S>::stamp_lane] = stamp(body);
   }
 
+  const CurveHulls<S>* hulls_;
   std::vector<Body> bodies_;
   std::span<const double> times_;  ///< keyframe times of all moving bodies
   bool alike_ = true;

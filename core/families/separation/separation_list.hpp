@@ -53,7 +53,9 @@ struct ListEdit {
 /// (`leave`). The numbers of removed pairs are reused.
 ///
 /// Boxes are compared on the flight plans with the margin of OverlapClock. The list may contain a pair of
-/// boxes that are apart by some ulps, and contains all pairs whose rounded boxes touch.
+/// boxes that are apart by some ulps, and contains all pairs whose rounded boxes touch. Boxes of a body on
+/// curves follow the chains of CurveHulls, which are linear between keyframes: the list may contain pairs of
+/// boxes that are apart by as much as a curve leaves its chord.
 ///
 /// With a queue that orders events by segments, a pair has an event only if its boxes begin or cease to
 /// overlap before the current segment ends. `open_segment` checks all pairs without an event when the next
@@ -274,6 +276,8 @@ class SeparationList {
   /// Returns all pairs by slot, for audits.
   std::span<const BoxPair> pairs() const { return tree_.pairs(); }
   const OverlapClock<S>& clock() const { return outlook_.clock(); }
+  /// Returns the box of a node that is compared with others.
+  RealisedBox<S> box(std::uint32_t body, std::uint32_t node) const { return outlook_.box(body, node); }
 
   /// Starts recording ended overlaps of leaves. Overlaps that last already count from t.
   void start_spans(double t) { leaves_.start_spans(t); }
