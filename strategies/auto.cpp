@@ -71,7 +71,7 @@ class Auto final : public OneOfMany<S>,
     seen_ = size_;
     refit_ = {};
     first_join_ = 0;
-    look_at_ = 1;
+    look_at_ = surface_at_ = 1;
     started_at_ = 0;
     step_ = 0;
     only_rays_ = plans_changed_ = plans_are_old_ = false;
@@ -248,10 +248,12 @@ class Auto final : public OneOfMany<S>,
     // A join answers the last frame of a segment before it begins the next one.
     const bool ends = is_join() ? t > segment_end_ : t >= segment_end_;
     if (step_ > 0 && (ends || (plans_are_old_ && seen_.changes_per_frame <= rare))) look_at_plans();
-    if (frame < look_at_) return;
-    look_at_ = frame + std::min(frame, longest_look);
-    seen_.translates = translate();
-    if (!refits(runner()) || !(surface_ > 0)) return;
+    if (frame >= look_at_) {
+      look_at_ = frame + std::min(frame, longest_look);
+      seen_.translates = translate();
+    }
+    if (frame < surface_at_ || !refits(runner()) || !(surface_ > 0)) return;
+    surface_at_ = frame + std::min(frame, longest_look);
     const double growth = std::max(1.0, runner().work->surface() / surface_);
     see_growth(growth);
   }
@@ -351,8 +353,9 @@ class Auto final : public OneOfMany<S>,
   struct {
     double box_tests = 0, pairs = 0, contacts = 1, growth = 1;
   } refit_;
-  double first_join_ = 0;                       ///< box tests for each contact of the first join
-  int look_at_ = 1, started_at_ = 0;            ///< frames: of the next look, of the active one's start
+  double first_join_ = 0;  ///< box tests for each contact of the first join
+  int look_at_ = 1, surface_at_ = 1,
+      started_at_ = 0;                          ///< frames: of the next looks, of the active one's start
   double step_ = 0, surface_ = 0;               ///< seconds; of the refitted boxes at the start
   double segment_begin_ = 0, segment_end_ = 0;  ///< seconds
   bool plans_changed_ = false, plans_are_old_ = false;  ///< since the last frame, since the last look
