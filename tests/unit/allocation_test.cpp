@@ -231,7 +231,9 @@ TEST(Allocation, NoneOfTheTreeOverBodiesOnceWarm) {
       session.reset(0.25 * round);
       const std::uint64_t before = allocations;
       session.probe(RayProbes<float>{RayQuery::closest, rays, std::span<RayHit>(hits)}, times);
-      if (round == 2) EXPECT_EQ(allocations - before, 0u) << id;
+      if (round == 2) {
+        EXPECT_EQ(allocations - before, 0u) << id;
+      }
     }
   }
 }

@@ -65,7 +65,7 @@ void ChoicePolicy::worked(double work, double contacts) {
   if (state_ == ChoiceState::stopped) state_ = ChoiceState::stays;
   if (left_ <= 0)
     transition(Event::unit_done);
-  else if (unit_work_ > limit_)
+  else if (unit_work_ > most_work())
     transition(Event::limit_reached);
 }
 
@@ -124,16 +124,16 @@ void ChoicePolicy::begin(std::size_t candidate, ChoiceState state) {
   left_ = std::max(1, offers_[candidate].frames);
   answered_ = 0;
   unit_work_ = 0;
-  limit_ = unlimited;
+  most_work_ = most_charge_ = unlimited;
   if (state == ChoiceState::tries) {
     allowance_ = allowance(candidate);
+    most_charge_ = settings_.budget * all_work_ - paid_ + allowance_;
     // More than a refit would take is not worth its work, but a stopped frame has to be answered again.
-    limit_ = settings_.budget * all_work_ - paid_ + allowance_;
-    if (candidate != refit) limit_ = std::min(limit_, (left_ + 1) * estimate(refit));
+    if (candidate != refit) most_work_ = (left_ + 1) * estimate(refit);
     stay_ = estimate(incumbent_);
     candidates_[candidate].regret = 0;
   } else if (candidate != refit && left_ > 1) {
-    limit_ = left_ * estimate(refit);
+    most_work_ = left_ * estimate(refit);
   }
 }
 

@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -41,12 +42,13 @@ enum class ChoiceState : std::uint8_t {
 /// `stay_estimate` for each frame that it has answered, but at least 0. Each candidate has one allowance for
 /// a trial that costs something: the refit's estimate times the frames of the unit. At all times
 ///   sum of all charges <= budget * W + sum of the allowances used.
-/// Proof. A charge beyond its allowance is paid from the budget. A trial begins with a limit on its work of
-/// at most its allowance, if that is not used yet, plus budget * W minus all that was paid before. Work
-/// beyond the limit is not done, a charge is at most the work, and W never decreases; so what has been paid
-/// never exceeds budget * W, and the sum follows. A candidate that cannot stop within a frame exceeds its
-/// limit, and with it the bound, by no more than the rest of that frame. Like the counters of a strategy, W
-/// and the charges contain no changes of the choice: these delay trials, as `Offer::change`.
+/// Proof. A charge beyond its allowance is paid from the budget. A trial begins with a limit on its charge of
+/// its allowance, if that is not used yet, plus budget * W minus all that was paid before. Work that would
+/// raise the charge beyond the limit is not done, and W never decreases; so what has been paid never exceeds
+/// budget * W, and the sum follows. A candidate that cannot stop within a frame exceeds its limit, and with
+/// it the bound, by no more than the rest of that frame. Like the counters of a strategy, W and the charges
+/// contain no changes of the choice: these delay trials, as `Offer::change`. A trial also ends when its work
+/// exceeds the refit's estimate for its unit and one frame more.
 ///
 /// Return to a refit. At the end of a unit the incumbent's own count replaces its estimate; if that exceeds
 /// the refit's, the refit becomes the incumbent, whatever the budget is. Within a unit of several frames the
@@ -87,7 +89,7 @@ class ChoicePolicy {
   /// Whether the active candidate began a unit in this frame.
   bool begins() const { return answered_ == 0; }
   /// Returns the work that the active candidate may do in this frame.
-  double limit() const { return limit_ - unit_work_; }
+  double limit() const { return most_work() - unit_work_; }
   /// Returns the estimated work of a frame of the incumbent, at the beginning of the last trial.
   double stay_estimate() const { return stay_; }
   /// Returns the estimated work of a frame of a candidate; infinite before its first unit.
@@ -122,6 +124,8 @@ class ChoicePolicy {
   std::size_t challenger();
   double allowance(std::size_t candidate) const;
   double charge() const;
+  /// Returns the work that the unit may have done; in a trial, each frame answered adds what staying costs.
+  double most_work() const { return std::min(most_work_, most_charge_ + stay_ * answered_); }
   double change_of_contacts(const Candidate& candidate) const;
 
   Settings settings_;
@@ -130,7 +134,8 @@ class ChoicePolicy {
   ChoiceState state_ = ChoiceState::stays;
   std::size_t active_ = refit, incumbent_ = refit, last_ = refit;
   int left_ = 0, answered_ = 0;  ///< frames of the unit
-  double unit_work_ = 0, first_work_ = 0, limit_ = 0, stay_ = 0, allowance_ = 0;
+  double unit_work_ = 0, first_work_ = 0, most_work_ = 0, most_charge_ = 0;
+  double stay_ = 0, allowance_ = 0;  ///< of the last trial
   double all_work_ = 0, charged_ = 0, allowances_ = 0, paid_ = 0;
   double found_ = -1;                  ///< contacts of the last frame
   double contacts_ = 1, changes_ = 0;  ///< relative number of contacts; other changes, and frames
