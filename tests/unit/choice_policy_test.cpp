@@ -277,6 +277,22 @@ TEST(ChoicePolicy, FollowsCostsThatDrift) {
   EXPECT_EQ(steady.policy.incumbent(), 1u);
 }
 
+// The limit of a trial is on its charge: each frame that it answers saves the work of staying.
+TEST(ChoicePolicy, ATrialWithAnExpensiveFirstFrameMayFinish) {
+  ChoicePolicy policy(2, {});
+  policy.start_over();
+  policy.worked(100, 50);
+  std::vector<Offer> offers{{.expected = 100, .hoped = 50},
+                            {.expected = 10, .hoped = 5, .frames = 10, .whole = 10}};
+  for (int frame = 0; frame < 10; ++frame) {
+    EXPECT_EQ(policy.next(offers), 1u) << "frame " << frame;
+    const double work = frame == 0 ? 950 : 10;
+    EXPECT_GE(policy.limit(), work);
+    policy.worked(work, 50);
+  }
+  EXPECT_EQ(policy.charges(), 950 + 9 * 10 - 10 * 100);
+}
+
 TEST(ChoicePolicy, StopsAJoinAtTheRefitOfItsFrames) {
   Steady steady(10);
   steady.play(10, 100, 300, 10, 1e9);
