@@ -1,514 +1,368 @@
-// A strategy that chooses among other strategies by observed properties of the scene: frames per segment of
-// the flight plans, vertex steps per frame, changes of plans, and candidates; the growth of boxes as trees
-// age, and the box tests that new trees save; the work of the interval join over whole segments compared with
-// a refit's, which decides after a trial whether the join stays; and the candidates that slabs at the leaves
-// leave out. The choice depends on counts and plans only, never on a clock, so that a run can be repeated.
+// A strategy that chooses among other strategies by the work that they do, in counts: never by a clock, so
+// that a run can be repeated. The candidates and the costs of their work stand in one table
+// (core/families/choice/choice_candidates.cpp). A policy decides which one answers the next unit, a frame or
+// a segment of the flight plans; it tries others within a stated budget, and returns to a refit where that
+// costs less (core/families/choice/choice_policy.hpp).
 //
 // Each candidate has one instance, with its own hierarchies, created with the strategy. This takes the memory
-// of all candidates, but a change of strategy creates no instance. An instance starts when it is chosen.
+// of all candidates, but a change of strategy creates no instance. An instance starts when it is first tried.
+//
+// Pairs within a body and sweeps are answered by the candidates that can. Sweeps report no work, so they
+// change no choice: the active candidate answers them, or the refit in its place.
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include "core/contract/registry.hpp"
+#include "core/base/cost_constants.hpp"
 #include "core/contract/reports_work.hpp"
-#include "core/families/choice/changes_of_many.hpp"
-#include "core/families/choice/observed_ageing.hpp"
-#include "core/families/choice/observed_join.hpp"
-#include "core/families/choice/observed_motion.hpp"
-#include "core/families/choice/observed_slabs.hpp"
-#include "core/families/choice/observed_work.hpp"
-#include "core/families/choice/predicted_costs.hpp"
+#include "core/families/choice/choice_candidates.hpp"
+#include "core/families/choice/choice_policy.hpp"
+#include "core/families/choice/one_of_many.hpp"
+#include "core/scene/self_pairs.hpp"
 
 namespace kbvh {
 namespace {
 
-/// A strategy to choose, its explicitly set parameters, and its predicted cost. To add a candidate, add a
-/// line: any registered strategy is suitable that follows plan changes and needs no more foresight than the
-/// next keyframe.
-struct Candidate {
-  const char* id;
-  std::map<std::string, std::string> params;
-  double (*cost)(const Observed&);
-};
-const std::vector<Candidate>& candidates() {
-  static const std::vector<Candidate> list{
-      {"leaf_slabs", {}, &refit_cost},  // first: it answers until observations exist
-      {"bottom_up", {}, &plain_cost},
-      {"lbvh_drift", {}, &rebuilt_cost},
-      {"drift_rebuild", {{"start", "sorted"}}, &sorted_cost},
-      {"drift_boxes", {}, &drift_cost},
-      {"interval_join", {}, &join_cost},
-  };
-  return list;
-}
-
-/// Counts nothing itself: its counters are those of its instances, so it does not derive from
-/// CountedStrategy.
 template <class S>
-class Auto final : public Strategy<S>,
-                   public AnswersChanges<S>,
-                   public AnswersProbes<S>,
-                   public TakesPlanChanges<S> {
+class Auto final : public OneOfMany<S>,
+                   public AnswersSelfPairs,
+                   public AnswersSweeps<S>,
+                   public AnswersProbes<S> {
+  using Base = OneOfMany<S>;
+  using Base::active;
+
  public:
   static constexpr Foresight foresight = Foresight::next_keyframe;
 
   Auto(const SceneView<S>& scene, const SegmentMotion<S>& motion, Topologies topologies, const Params& params)
-      : Strategy<S>(scene, motion),
-        motion_(motion),
-        steps_(scene, motion, topologies),
-        gain_(params.number("gain")) {
-    for (const Candidate& candidate : candidates()) {
+      : Base(scene, motion), motion_(motion) {
+    for (const ChoiceCandidate& candidate : choice_candidates()) {
       const auto found = std::find_if(registry().begin(), registry().end(), [&](const StrategyEntry& entry) {
         return entry.info.id == candidate.id;
       });
-      if (found == registry().end() || !found->info.can.plan_changes || !found->info.can.rays) continue;
-      const Params own(found->info.id, found->info.parameters, candidate.params);
-      runners_.push_back({&candidate, found->info.positions == PositionUse::all,
-                          NestedStrategies<S>::create(*found, scene, motion, topologies, own)});
-      Runner& runner = runners_.back();
-      runner.work = dynamic_cast<ReportsWork*>(runner.strategy.get());
+      if (found == registry().end() || (has_self_pairs(scene.pairs()) && !found->info.can.self_pairs))
+        continue;
+      const Params own(candidate.id, found->info.parameters, candidate.params);
+      this->instances_.push_back(
+          {&found->info, NestedStrategies<S>::create(*found, scene, motion, topologies, own)});
+      runners_.push_back({&candidate, dynamic_cast<ReportsWork*>(this->instances_.back().strategy.get())});
+      if (runners_.back().work == nullptr)
+        throw ConfigError(std::string(candidate.id) + " reports no work to choose by");
     }
     if (runners_.empty()) throw ConfigError("auto has nothing to choose from");
+    for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
+      const double primitives = scene.primitives(body).count();
+      primitives_ += primitives;
+      if (!scene.moving(body)) continue;
+      size_.bodies += 1;
+      size_.primitives += primitives;
+      // Leaves of a mesh share vertices, those of a soup do not.
+      size_.reads += std::max(0.85 * primitives, double(scene.vertex_count(body)));
+    }
+    offers_.resize(runners_.size());
+    policy_.emplace(runners_.size(), ChoicePolicy::Settings{.gain = params.number("gain")});
   }
 
   void reset_to(double t) override {
-    for (Runner& runner : runners_) {
-      runner.started = false;
-      runner.frames = 0;
-      runner.factor = 1;
-    }
-    retired_ = {};
-    changed_.clear();
-    start(runners_[0], t);
-    active_ = 0;
-    frame_ = chosen_at_ = 0;
-    stay_ = shortest_stay;
+    policy_->start_over();
+    this->start_over(t);
+    for (Runner& runner : runners_) runner.searched_until = -never;
+    seen_ = size_;
+    refit_ = {};
+    first_join_ = 0;
+    look_at_ = surface_at_ = 1;
+    started_at_ = 0;
     step_ = 0;
-    segment_end_ = t;
-    changes_ = false;
-    chosen_candidates_ = 0;
-    chosen_near_ = false;
-    touching_.clear();
-    touching_of_ = nullptr;
-    joined_candidates_ = 0;
-    changes_of_many_.start_over();
-    pairs_asked_ = pairs_in_frame_ = rays_asked_ = false;
-    window_.close();
-    body_changed_.assign(this->scene_.body_count(), 0);
-    seen_ = {};
-    seen_.reads = steps_.reads();
-    seen_.primitives = steps_.primitives();
-    seen_.bodies = steps_.moving_bodies();
-    ageing_.start_over(runners_[0].work != nullptr ? runners_[0].work->surface() : 0);
-    chosen_tests_ = 0;
-    searches_.start_over();
-    saved_ = 0;
-    savings_counted_until_ = 0;
-    tried_ = waits_ = refits_first_ = joins_first_ = false;
-    join_.start_over(seen_);
-    slabs_.start_over(runners_[0].candidate->cost == &refit_cost, seen_);
+    only_rays_ = plans_changed_ = plans_are_old_ = false;
+    segment_begin_ = segment_end_ = t;
+    surface_ = runner().work->surface();
+    begin_frame(t);
   }
 
   void advance_to(double t) override {
-    const double before = this->previous_time();
-    ++frame_;
-    pairs_in_frame_ = false;
-    seen_.changes_per_frame += ((changes_ ? 1.0 : 0.0) - seen_.changes_per_frame) / std::min(frame_, 16);
-    changes_ = false;
-    if (t > before) step_ = t - before;
-    const std::size_t last = active_;
-    const int stayed = frame_ - chosen_at_;
-    const bool due = frame_ == 1 || stayed >= (t >= segment_end_ ? stay_ : longest_stay) ||
-                     (seen_.changes_per_frame > 0 && !runners_[active_].all_positions) ||
-                     seen_.near != chosen_near_ || seen_.candidates > 2 * chosen_candidates_ ||
-                     2 * seen_.candidates < chosen_candidates_ || tried_ || (waits_ && t >= segment_end_) ||
-                     (is_active(&join_cost) && seen_.near && !join_.judged()) || overworked() ||
-                     (refits() && ageing_.tests() > 1.5 * chosen_tests_);
-    if (step_ > 0 && due) choose(t);
-    if (active_ != last) {
-      changes_of_many_.switched();
-      saved_ = 0;
-      savings_counted_until_ = frame_;
-    }
-    tried_ = active_ != last &&
-             ((rebuilds() && !rebuilds(last)) || is_active(&plain_cost) || join_.outdated() || refits_first_);
-    joins_first_ = active_ != last && is_active(&join_cost);
-    Runner& runner = runners_[active_];
-    if (active_ != last) start(runner, t);
-    window_.advance(frame_, runner.work, this->sampled_.fetched());
-    if (active_ == last) {
-      if (runner.all_positions) fetch_all();
-      runner.strategy->advance(t);
-    }
-    ++runner.frames;
+    end_frame();
+    if (t > this->previous_time()) step_ = t - this->previous_time();
+    look(t);
+    if (!policy_->due() && frames_of(policy_->active(), t) > 0) return answer_by(policy_->go_on(), t);
+    make_offers(t);
+    answer_by(policy_->next(offers_), t);
   }
 
   QueryStatus find_candidates(double t, PairBuffer& out, const Budget& /*budget*/) override {
     const std::size_t before = out.size();
-    give_up_endless_join(t);
+    QueryStatus status;
+    bool done = false;
+    if (policy_->state() == ChoiceState::tries && active().info->can.time_budget) {
+      status = active().strategy->candidates_at(t, out, {most_box_tests()});
+      done = status.complete();
+      if (!done) {
+        out.resize(before);
+        stop(t);
+      }
+    } else {
+      stop_endless_join(t);
+    }
     // Not all candidates honour a budget.
-    const QueryStatus status = runners_[active_].strategy->candidates_at(t, out, {});
-    see_candidates(out.size() - before, true);
-    const std::size_t count = out.size() - before,
-                      stride = std::max<std::size_t>(1, count / ObservedMotion<S>::samples);
-    touching_.clear();
-    touching_of_ = nullptr;
-    for (std::size_t i = 0; i < count && touching_.size() < ObservedMotion<S>::samples; i += stride)
-      touching_.push_back(out[before + i]);
+    if (!done) status = active().strategy->candidates_at(t, out, {});
+    see(out.size() - before);
     return status;
   }
 
+  /// Counts the contacts: pairs that intersect are the same for all candidates, unlike those that may.
   void confirm_candidates(double t, PairBuffer& pairs) override {
-    runners_[active_].strategy->confirm(t, pairs);
+    Base::confirm_candidates(t, pairs);
+    contacts_ = double(pairs.size());
   }
 
   void find_changes(double t, Answer answer, PairBuffer& begun, PairBuffer& ended) override {
-    give_up_endless_join(t);
-    changes_of_many_.find(*runners_[active_].strategy, t, answer, begun, ended);
-    const PairSet& pairs = changes_of_many_.pairs(answer);
-    // Estimates the number of candidates from the pairs that intersect.
-    see_candidates(pairs.size(), answer == Answer::candidates);
-    touching_of_ = &pairs;
+    stop_endless_join(t);
+    Base::find_changes(t, answer, begun, ended);
+    see(this->pairs_of_changes(answer).size());
   }
 
   void answer_probes(double t, const Probes<S>& probes) override {
-    const Runner& runner = runners_[active_];
-    runner.strategy->probe_at(t, probes);
-    rays_asked_ = true;
-    // If pairs are asked for as well, they show how trees age.
-    if (pairs_in_frame_ || runner.work == nullptr) return;
-    const double tests = costs::Ageing::ray_test * double(runner.work->last_ray_tests());
-    if (refits()) seen_.slab_tests = seen_.plain_tests = tests;
-    see_tests(tests, 0);
+    active().strategy->probe_at(t, probes);
+    ray_tests_ += double(runner().work->last_ray_tests());
+    asked_ = true;
   }
 
   void follow_plans(double t, std::span<const PlanChange<S>> changes) override {
-    for (const PlanChange<S>& change : changes) {
-      if (body_changed_[change.body] != 0) continue;
-      body_changed_[change.body] = 1;
-      changed_.push_back(change);
-    }
-    runners_[active_].strategy->flight_plans_changed(t, changes);
-    changes_ = true;
+    Base::follow_plans(t, changes);
+    plans_changed_ = true;
   }
 
-  bool wants_all_positions() const override { return runners_[active_].all_positions; }
-
-  std::optional<AuditView> audit_view(std::uint32_t body) const override {
-    return runners_[active_].strategy->audit_view(body);
+  void prepare_sweep(double t) override {
+    if (!active().info->can.contacts) {
+      this->step_back();
+      Base::answer_by(ChoicePolicy::refit, t);
+    }
+    active().strategy->start_sweep(t);
+  }
+  void find_swept_pairs(double t0, double t1, std::span<const S* const> before, PairBuffer& out) override {
+    active().strategy->swept_pairs(t0, t1, before, out);
   }
 
   std::string choice() const override {
-    std::string text;
-    for (const Runner& runner : runners_)
-      if (runner.frames > 0)
-        text += (text.empty() ? "" : ", ") + std::string(runner.candidate->id) + " for " +
-                std::to_string(runner.frames) + (runner.frames == 1 ? " frame" : " frames");
-    if (text.empty()) return text;
-    return text + last_seen(seen_);
-  }
-
-  void be_timed() override {
-    for (Runner& runner : runners_) runner.strategy->be_timed();
-  }
-
-  std::size_t bytes() const override {
-    std::size_t total = touching_.capacity() * sizeof(PrimitivePair) +
-                        changed_.capacity() * sizeof(PlanChange<S>) + changes_of_many_.bytes() +
-                        steps_.bytes();
-    for (const Runner& runner : runners_) total += runner.strategy->bytes();
-    return total;
-  }
-
- protected:
-  void start_counting() override { first_fetch_ = this->sampled_.fetched(); }
-  Counters counted() const override {
-    Counters table = retired_;
-    for (const Runner& runner : runners_)
-      if (runner.started) add(table, runner.strategy->counters());
-    table[Counter::positions_fetched] = this->sampled_.fetched() - first_fetch_;
-    return table;
+    const std::string text = Base::choice();
+    return text.empty() ? text : text + last_seen(seen_);
   }
 
  private:
   struct Runner {
-    const Candidate* candidate;
-    bool all_positions;
-    std::unique_ptr<Strategy<S>> strategy;
-    ReportsWork* work = nullptr;  ///< the strategy, if it reports its work; else null
-    double factor = 1;            ///< measured / predicted cost, if it cost more than a refit
-    bool started = false;         ///< since `reset`
-    int frames = 0;               ///< number of frames that it answered
+    const ChoiceCandidate* candidate;
+    ReportsWork* work;
+    double searched_until = 0;  ///< end of the segment of its last search
+    int frames = 1;             ///< of its last unit
   };
-  /// Frames after which the choice is reviewed within a segment, and at the start of a new one. The latter
-  /// doubles each time that the choice is confirmed.
-  static constexpr int longest_stay = 64, shortest_stay = 8;
-  /// A join's first segment may take this many times the work of refits in the segment's frames.
-  static constexpr double join_trial = 8;
-  static constexpr double forgets = 0.9;  ///< at each choice, exponent of the factors measured for the others
+  static constexpr double never = std::numeric_limits<double>::infinity();
+  /// Frames after which the surfaces of boxes are looked at again, and of the longest unit.
+  static constexpr int longest_look = 16, longest_unit = 128;
 
-  static void add(Counters& sum, const Counters& other) {
-    for (const Counter peak : {Counter::list_peak, Counter::queue_peak}) {
-      const std::uint64_t most = std::max(sum[peak], other[peak]);
-      sum[peak] = most - other[peak];
+  Runner& runner() { return runners_[policy_->active()]; }
+  const Runner& runner() const { return runners_[policy_->active()]; }
+  const ChoiceCandidate& candidate() const { return *runner().candidate; }
+  bool is_join() const { return candidate().unit == ChoiceUnit::segment; }
+  static bool refits(const Runner& one) {
+    return one.candidate->unit == ChoiceUnit::frame && !(one.candidate->build > 0);
+  }
+  void answer_by(std::size_t next, double t) {
+    if (!this->goes_on(next)) {
+      started_at_ = this->frame() + 1;
+      runners_[next].searched_until = -never;
     }
-    const std::uint64_t fetched = sum[Counter::positions_fetched];
-    for (std::size_t c = 0; c < sum.values.size(); ++c) sum.values[c] += other.values[c];
-    // All instances read the same positions, and each counts the fetches of all instances.
-    sum[Counter::positions_fetched] = fetched;
-    for (const Counters::Named& counter : other.named) sum.add(counter.name, counter.value);
+    if (policy_->begins()) runners_[next].frames = offers_[next].frames;
+    Base::answer_by(next, t);
+    begin_frame(t);
   }
 
-  /// Whether the active strategy only refits its trees.
-  bool refits() const { return active_ == 0 || is_active(&plain_cost); }
-  bool is_active(double (*cost)(const Observed&)) const { return runners_[active_].candidate->cost == cost; }
-  bool is_join(std::size_t runner) const { return runners_[runner].candidate->cost == &join_cost; }
-  bool rebuilds(std::size_t runner) const {
-    const auto cost = runners_[runner].candidate->cost;
-    return cost == &rebuilt_cost || cost == &sorted_cost;
+  // ---- Limits
+
+  /// Returns the box tests that the active candidate may make in this frame.
+  std::uint64_t most_box_tests() const {
+    return std::uint64_t(std::clamp((policy_->limit() - update_work()) / candidate().box_test, 0.0, 1e15));
   }
-  /// Whether the active strategy builds new trees.
-  bool rebuilds() const { return rebuilds(active_); }
-  /// Returns the candidate to compare a join with: in trees that have aged, a refit would take long.
-  std::size_t refit_to_compare() const { return seen_.aged > 0.5 ? builder() : 0; }
-  /// Returns lbvh_drift, or the first strategy without it.
-  std::size_t builder() const {
-    for (std::size_t i = 0; i < runners_.size(); ++i)
-      if (rebuilds(i)) return i;
-    return 0;
+  /// Lets another candidate answer this frame, after the active one has made all box tests that it may.
+  void stop(double t) {
+    const double work = update_work() + candidate().box_test * double(most_box_tests());
+    this->step_back();
+    answer_by(policy_->stopped(work), t);
   }
-  static constexpr std::size_t none_of_them = ~std::size_t(0);
-  /// Returns the strategy of least predicted cost among those that are `allowed`.
-  template <class Allowed>
-  std::size_t least(Allowed&& allowed) const {
-    std::size_t best = none_of_them;
-    for (std::size_t i = 0; i < runners_.size(); ++i)
-      if (allowed(i) && (best == none_of_them || cost_of(i) < cost_of(best))) best = i;
-    return best;
+  /// A join that can be stopped takes longer, so its search is watched only where it may reach the limit.
+  void stop_endless_join(double t) {
+    if (!is_join() || policy_->state() == ChoiceState::stopped) return;
+    const double usual = runner().frames * policy_->estimate(policy_->active());
+    if (usual >= policy_->limit() / 4 && !runner().work->searches_within(most_box_tests())) stop(t);
   }
-  double cost_of(std::size_t runner) const {
-    return runners_[runner].factor * runners_[runner].candidate->cost(seen_);
+
+  // ---- Counted work
+
+  void begin_frame(double t) {
+    asked_ = pairs_asked_ = false;
+    ray_tests_ = found_ = contacts_ = 0;
+    span_tests_ = runner().work->span_tests();
+    frame_tests_ = runner().work->frame_tests();
+    fetched_ = this->sampled_.fetched();
+    // The search of a join serves a segment; after its end, the next frame searches again.
+    searches_ = !is_join() || t > runner().searched_until;
+    if (searches_) runner().searched_until = segment_end_;
   }
-  /// Whether box tests and candidates of the active strategy alone cost more than a refit, for any reason.
-  /// For a join over bodies that were not expected to meet, this is its own work; for drift_boxes, the mean
-  /// over some frames, because one search serves many. Refits and new trees are compared by their searches.
-  bool overworked() const {
-    if (is_active(&join_cost)) return !seen_.near && searched() > gain_ * refit_cost(seen_);
-    return is_active(&drift_cost) && frame_ - chosen_at_ >= shortest_stay &&
-           searched() > gain_ * refit_cost(searches_.as_seen(seen_, frame_ - chosen_at_));
+  void see(std::size_t candidates) {
+    found_ = contacts_ = double(candidates);
+    asked_ = pairs_asked_ = true;
   }
-  /// Returns the mean cost of box tests and candidates of the active strategy since it was last chosen; for a
-  /// join, the cost of the box tests of its segment.
-  double searched() const {
-    using Work = costs::Work;
-    const ReportsWork* work = runners_[active_].work;
-    if (is_active(&join_cost))
-      return work == nullptr
-                 ? 0
-                 : Work::join_box_test * double(work->last_box_tests()) / seen_.frames_per_segment;
-    return searches_.cost(frame_ - chosen_at_);
-  }
-  /// Returns the strategy of least predicted cost among those that are `allowed`, or the active one if none
-  /// is cheaper by `gain`.
-  template <class Allowed>
-  std::size_t cheapest(double gain, Allowed&& allowed) const {
-    const std::size_t best = least(allowed);
-    return best != none_of_them && cost_of(best) * gain < cost_of(active_) ? best : active_;
-  }
-  /// Prepares the first comparison of new trees with refitted ones: in the frame after a refit, and with the
-  /// cheapest build. Boxes that have grown justify it, even where a join is predicted to be faster than
-  /// either.
-  void try_new_trees(std::size_t& best) {
-    refits_first_ = rebuilds(best) && !refits() && seen_.aged <= 0.5;
-    if (refits_first_)
-      best = 0;
-    else if (rebuilds(best) || (is_join(best) && refits() && seen_.aged > 0.5))
-      best = builder();
-  }
-  /// Whether new trees by `best` pay for their first frame before the next review. Adds what they would have
-  /// saved in the frames since the last call, or since the last change of strategy, and what they will save
-  /// in the next frames. Assumes that each frame is like this one.
-  bool worth_a_start(std::size_t best) {
-    double now = cost_of(active_);
-    if (!std::isfinite(now)) now = cost_of(least([&](std::size_t runner) { return !rebuilds(runner); }));
-    const double saves = std::max(0.0, now - cost_of(best));
-    saved_ += saves * (frame_ - savings_counted_until_);
-    savings_counted_until_ = frame_;
-    return saved_ + saves * shortest_stay > costs::Choice::start_primitive * seen_.primitives;
-  }
-  /// Starts an instance, at the beginning or when it is chosen. It sees the current plans, but does not know
-  /// which bodies no longer rest.
-  void start(Runner& runner, double t) {
-    if (runner.started) add(retired_, runner.strategy->counters());
-    if (runner.all_positions) fetch_all();
-    runner.strategy->reset(t);
-    if (!changed_.empty()) runner.strategy->flight_plans_changed(t, changed_);
-    runner.started = true;
-  }
-  /// Lets a refit answer this frame if the first join after a change of strategy would take many times the
-  /// work of a refit in all frames of the segment.
-  void give_up_endless_join(double t) {
-    if (!std::exchange(joins_first_, false) || runners_[active_].work == nullptr) return;
-    const double frame = std::max(refit_cost(seen_), costs::Work::slabs.read * seen_.reads);
-    const double most =
-        join_trial * frame * std::max(1.0, seen_.frames_per_segment) / costs::Work::join_box_test;
-    if (runners_[active_].work->searches_within(std::uint64_t(std::min(most, 1e15)) + 1)) return;
-    join_.given_up(join_trial, seen_);
-    --runners_[active_].frames;
-    active_ = 0;
-    ++runners_[active_].frames;
-    start(runners_[active_], t);
-    changes_of_many_.switched();
-    window_.close();
-    stay_ = shortest_stay;
-  }
-  /// Strategies differ in the pairs that they leave out early. Only drift_boxes reports all pairs of boxes,
-  /// and so shows that bodies are apart.
-  void see_candidates(std::size_t count, bool all) {
-    pairs_asked_ = pairs_in_frame_ = true;
-    const ReportsWork* work = runners_[active_].work;
-    searches_.add(work, double(count));
-    if (count != 0 || is_active(&drift_cost)) seen_.near = count != 0;
-    if (!seen_.near) seen_.candidates = double(count);
-    if (is_active(&join_cost)) joined_candidates_ = double(count);
-    if (is_active(&refit_cost) && work != nullptr)
-      slabs_.slabs(double(count), *work, all, frame_, seen_);
-    else if (is_active(&plain_cost) && work != nullptr)
-      slabs_.plain(double(count), *work, all, frame_, seen_);
-    if (work != nullptr) see_tests(double(work->last_box_tests()), double(count));
-  }
-  void see_tests(double tests, double count) {
-    if (refits())
-      ageing_.refitted(tests, count, frame_, seen_);
-    else if (rebuilds())
-      ageing_.rebuilt(tests / (is_active(&sorted_cost) ? 1 : costs::Choice::built_tests), count,
-                      std::max(1, frame_), seen_);
-  }
-  /// Measures the work of the active strategy since the last choice, or since its window began. `whole`: a
-  /// segment ends at this frame.
-  void see_work(bool whole) {
-    const Runner& runner = runners_[active_];
-    const double frames = frame_ - chosen_at_;
-    if (refits() && runner.work != nullptr) {
-      ageing_.look_at_refitted(runner.work->surface(), frame_, seen_);
-      join_.refitted(frame_, seen_);
-    } else if (rebuilds() && runner.work != nullptr && frames >= shortest_stay) {
-      ageing_.look_at_rebuilt(runner.work->growth(), is_active(&sorted_cost), seen_);
+  /// Returns the work of this frame without the query.
+  double update_work() const { return searches_ ? candidate().update(seen_) : candidate().frame; }
+  /// Counts the work of the frame that ends.
+  void end_frame() {
+    only_rays_ = asked_ && !pairs_asked_;
+    if (!asked_) return;
+    const ReportsWork& work = *runner().work;
+    const double pair_tests = pairs_asked_ && searches_ ? double(work.last_box_tests()) : 0,
+                 ray_tests = costs::Ageing::ray_test * ray_tests_;
+    double query = ray_tests + candidate().box_test * pair_tests + candidate().pair * found_;
+    if (is_join())
+      query += ChoicePrices::span_test * double(work.span_tests() - span_tests_) +
+               ChoicePrices::frame_test * double(work.frame_tests() - frame_tests_) +
+               ChoicePrices::fetch * double(this->sampled_.fetched() - fetched_);
+    if (candidate().build > 0) {
+      const bool known = this->frame() - started_at_ >= frames_of_unit;
+      query += upkeep(candidate().build * seen_.primitives,
+                      known ? candidate().box_test * work.growth() : seen_.ageing);
     }
-    if (rebuilds()) join_.refitted(frame_, seen_);
-    // From time to time drift_boxes may check whether bodies have parted.
-    if (frames >= longest_stay && seen_.candidates == 0) seen_.near = false;
-    if (!is_active(&join_cost)) {
-      if (frames >= shortest_stay) join_.forget(seen_);
-    } else if (whole && window_.has_frames(frame_)) {
-      const double work =
-          seen_.near ? window_.work(frame_, runner.work, this->sampled_.fetched(), seen_) : searched();
-      join_.joined(work, joined_candidates_, frame_, seen_);
+    policy_->worked(update_work() + query, contacts_);
+    if (policy_->active() == ChoicePolicy::refit)
+      refit_ = {pair_tests + ray_tests, found_, policy_->contacts(), seen_.growth};
+    if (is_join() && pair_tests > 0) see_join_age(pair_tests / policy_->contacts());
+  }
+
+  // ---- Observations
+
+  /// Looks at the plans where a segment begins and after changes that have become rare, and from time to time
+  /// at velocities and at the surfaces of boxes.
+  void look(double t) {
+    const int frame = this->frame() + 1;
+    plans_are_old_ = plans_are_old_ || plans_changed_;
+    seen_.changes_per_frame +=
+        ((std::exchange(plans_changed_, false) ? 1.0 : 0.0) - seen_.changes_per_frame) / std::min(frame, 16);
+    // A join answers the last frame of a segment before it begins the next one.
+    const bool ends = is_join() ? t > segment_end_ : t >= segment_end_;
+    if (step_ > 0 && (ends || (plans_are_old_ && seen_.changes_per_frame <= rare))) look_at_plans();
+    if (frame >= look_at_) {
+      look_at_ = frame + std::min(frame, longest_look);
+      seen_.translates = translate();
     }
+    if (frame < surface_at_ || !refits(runner()) || !(surface_ > 0)) return;
+    surface_at_ = frame + std::min(frame, longest_look);
+    const double growth = std::max(1.0, runner().work->surface() / surface_);
+    see_growth(growth);
   }
-
-  void fetch_all() {
-    for (std::uint32_t body = 0; body < this->scene_.body_count(); ++body) this->sampled_.fetch_all(body);
+  void see_growth(double growth) {
+    policy_->changed(std::abs(growth / seen_.growth - 1));
+    seen_.growth = growth;
   }
-
-  /// Reads the plans, and switches to a strategy that is predicted to be faster than the active one by at
-  /// least `gain_`.
-  void choose(double t) {
-    double begin = -std::numeric_limits<double>::infinity(), end = std::numeric_limits<double>::infinity();
-    if (seen_.changes_per_frame == 0)  // otherwise the observation takes too long and is unreliable
-      for (std::uint32_t body = 0; body < this->scene_.body_count(); ++body) {
-        begin = std::max(begin, motion_.lines_begin(body));
-        end = std::min(end, motion_.lines_end(body));
+  /// A join's trees are those of the refit. Their age shows in its box tests for each contact, if clearly.
+  void see_join_age(double tests_per_contact) {
+    if (!(first_join_ > 0)) first_join_ = tests_per_contact;
+    const double grown = tests_per_contact / first_join_;
+    if (grown > 1.5) see_growth(std::cbrt(grown * grown));
+  }
+  void look_at_plans() {
+    plans_are_old_ = false;
+    segment_begin_ = -never;
+    segment_end_ = never;
+    for (std::uint32_t body = 0; body < this->scene_.body_count(); ++body) {
+      segment_begin_ = std::max(segment_begin_, motion_.lines_begin(body));
+      segment_end_ = std::min(segment_end_, motion_.lines_end(body));
+    }
+    seen_.frames = std::max(1.0, (segment_end_ - segment_begin_) / step_);
+    if (seen_.translates) seen_.translates = translate();
+  }
+  /// Whether some bodies move as a whole: each of them the same at its first, middle and last vertex.
+  bool translate() const {
+    int looked_at = 0;
+    for (std::uint32_t body = 0; body < this->scene_.body_count() && looked_at < 4; ++body) {
+      const std::uint32_t count = this->scene_.vertex_count(body);
+      if (!this->scene_.moving(body) || count == 0) continue;
+      ++looked_at;
+      double way[3], differs = 0, length = 0;
+      for (int axis = 0; axis < 3; ++axis) {
+        way[axis] = velocity(body, 0, axis);
+        for (const std::uint32_t vertex : {count / 2, count - 1})
+          differs = std::max(differs, std::abs(velocity(body, vertex, axis) - way[axis]));
+        length = std::max(length, std::abs(way[axis]));
       }
-    const bool bounded =
-        begin > -std::numeric_limits<double>::infinity() && end < std::numeric_limits<double>::infinity();
-    // A join does its work for a segment at the start, so it is not left within one, unless the segment is
-    // long.
-    const bool whole = bounded && begin > this->previous_time();
-    if (is_active(&join_cost) && bounded && !whole && frame_ - chosen_at_ < 2 * longest_stay) return;
-    const bool known = join_.known();
-    see_work(whole);
-    if (is_active(&drift_cost))
-      runners_[active_].factor =
-          overworked() ? std::max(1.0, searched() / drift_cost(searches_.as_seen(seen_, frame_ - chosen_at_)))
-                       : 1;
-    for (std::size_t i = 0; i < runners_.size(); ++i)
-      if (i != active_) runners_[i].factor = std::pow(runners_[i].factor, forgets);
-    searches_.start_over();
-    chosen_at_ = frame_;
-    chosen_candidates_ = seen_.candidates;
-    chosen_near_ = seen_.near;
-    chosen_tests_ = ageing_.tests();
-    seen_.rays_only = rays_asked_ && !pairs_asked_;
-    rays_asked_ = pairs_asked_ = false;
-    if (touching_of_ != nullptr) {
-      touching_.clear();
-      touching_of_->sample(ObservedMotion<S>::samples, touching_);
+      if (length == 0 || differs > 0.02 * length) return false;
     }
-    steps_.observe(step_, touching_, seen_);
-    segment_end_ = end > t ? end : t;
-    if (bounded)
-      seen_.frames_per_segment = std::max(1.0, (end - begin) / step_);
-    else if (frame_ == 1 || seen_.changes_per_frame > 0)
-      seen_.frames_per_segment = std::numeric_limits<double>::infinity();
-    slabs_.prepare_choice(frame_ - 1, seen_);
-    const double gain = tried_ || known != join_.known() ? 1 : gain_;
-    std::size_t best = cheapest(gain, [](std::size_t) { return true; });
-    refits_first_ = false;
-    // Checked at the end of a segment, where a refitted frame costs no second join.
-    if (join_.outdated())
-      best = refit_to_compare();
-    else if (!ageing_.compared() && !rebuilds())
-      try_new_trees(best);
-    if (!join_.outdated() && rebuilds(best) && !rebuilds() && !worth_a_start(best))
-      best = cheapest(gain, [&](std::size_t runner) { return !rebuilds(runner); });
-    // A join over the last frames of a segment costs as much as one over the whole segment.
-    waits_ = best != active_ && is_join(best) && bounded && !whole &&
-             cost_of(active_) * (end - t) < join_cost(seen_) * seen_.frames_per_segment * step_;
-    if (waits_) return;
-    stay_ = best == active_ ? std::min(2 * stay_, longest_stay) : shortest_stay;
-    active_ = best;
-    if (!is_active(&join_cost))
-      window_.close();
-    else if (whole)
-      window_.open_next();
+    return looked_at > 0;
   }
+  double velocity(std::uint32_t body, std::uint32_t vertex, int axis) const {
+    const Piece<S> piece = motion_.piece(body, vertex, axis);
+    return piece.kind == PieceKind::ray ? double(piece.x1)
+                                        : (double(piece.x1) - double(piece.x0)) / (piece.t1 - piece.t0);
+  }
+
+  void make_offers(double t) {
+    seen_.refit = never;
+    for (std::size_t i = 0; i < runners_.size(); ++i)
+      if (refits(runners_[i])) seen_.refit = std::min(seen_.refit, policy_->estimate(i));
+    const double more = policy_->contacts() / refit_.contacts;
+    seen_.box_tests = more * refit_.box_tests * std::pow(seen_.growth / refit_.growth, 1.5);
+    seen_.pairs = more * refit_.pairs;
+    seen_.ageing = seen_.box_tests * (1 - 1 / seen_.growth) / (this->frame() + 1);
+    for (std::size_t i = 0; i < runners_.size(); ++i) {
+      const ChoiceCandidate& one = *runners_[i].candidate;
+      const bool joins = one.unit == ChoiceUnit::segment;
+      Offer& offer = offers_[i];
+      offer.frames = frames_of(i, t);
+      offer.whole =
+          joins ? std::max(offer.frames, int(std::min(seen_.frames, double(longest_unit)))) : offer.frames;
+      offer.fixed = joins ? one.frame + (one.update(seen_) - one.frame) / offer.whole : one.update(seen_);
+      offer.change = this->goes_on(i) ? 0 : ChoicePrices::start * primitives_ + one.build * seen_.primitives;
+      const auto [expected, hoped] = one.predict(seen_, one);
+      offer.expected = expected;
+      offer.hoped = hoped;
+    }
+  }
+  /// Returns the frames that a candidate could answer from this one on with one unit.
+  int frames_of(std::size_t runner, double t) const {
+    const ChoiceUnit unit = runners_[runner].candidate->unit;
+    // Rays meet the same trees with slabs and without; they do not show the work of those that are no trees.
+    const bool by_rays =
+        unit == ChoiceUnit::frame && (runner == ChoicePolicy::refit || !refits(runners_[runner]));
+    if (only_rays_ && !by_rays) return 0;
+    if (unit == ChoiceUnit::frame) return 1;
+    if (unit == ChoiceUnit::frames) return frames_of_unit;
+    // A search for the last frames of a segment takes as long as one for all of it.
+    const bool begins = step_ > 0 && (runner == policy_->active() ||
+                                      segment_end_ - t >= most_of_it * (segment_end_ - segment_begin_));
+    if (!begins || seen_.changes_per_frame > rare || !(segment_end_ - segment_begin_ < never)) return 0;
+    return int(std::clamp((segment_end_ - t) / step_ + 1.5, 1.0, double(longest_unit)));
+  }
+
+  static constexpr double rare = 0.02;       ///< changes of plans per frame
+  static constexpr double most_of_it = 0.6;  ///< of a segment that has to be left for a join to begin
 
   SegmentMotion<S> motion_;
-  ObservedMotion<S> steps_;
-  double gain_;
-  std::vector<Runner> runners_;
-  Counters retired_;  ///< counts of instances before their restart
-  std::size_t active_ = 0;
-  std::uint64_t first_fetch_ = 0;
-  int frame_ = 0, chosen_at_ = 0, stay_ = shortest_stay;
-  double step_ = 0, segment_end_ = 0;  ///< seconds
-  double chosen_candidates_ = 0;       ///< number of candidates at the time of the choice
-  bool chosen_near_ = false;           ///< whether bodies met at that time
-  double chosen_tests_ = 0;            ///< box tests of the refitted trees in the last frame
-  ObservedSearches searches_;          ///< since the last choice
-  double saved_ = 0;                   ///< nanoseconds, see worth_a_start
-  int savings_counted_until_ = 0;      ///< frame up to which savings are in `saved_`
-  bool tried_ = false;                 ///< on trial: its work decides whether the active strategy stays
-  ObservedAgeing ageing_;
-  bool joins_first_ = false;   ///< the join answers for the first time since another strategy
-  bool waits_ = false;         ///< for the next segment, before a join is chosen
-  bool refits_first_ = false;  ///< a refit answers before new trees are tried
-  ObservedJoin join_;
-  double joined_candidates_ = 0;  ///< of the join's last frame
-  JoinWindow window_;
-  ObservedSlabs slabs_;
-  bool pairs_asked_ = false, rays_asked_ = false;  ///< since the last choice
-  bool pairs_in_frame_ = false;
-  bool changes_ = false;                ///< plans changed since the last frame
-  std::vector<PlanChange<S>> changed_;  ///< the first change of each body since `reset`
-  std::vector<std::uint8_t> body_changed_;
-  PairBuffer touching_;                   ///< sample of the candidates of the last frame
-  const PairSet* touching_of_ = nullptr;  ///< where to sample them at a choice; null: sampled already
-  ChangesOfMany<S> changes_of_many_;
-  Observed seen_;
+  std::vector<Runner> runners_;  ///< of the instances
+  std::vector<Offer> offers_;    ///< [runner]
+  std::optional<ChoicePolicy> policy_;
+  double primitives_ = 0;  ///< of all bodies
+  Observed size_, seen_;   ///< before any frame, and now
+  /// The last frame of the refit.
+  struct {
+    double box_tests = 0, pairs = 0, contacts = 1, growth = 1;
+  } refit_;
+  double first_join_ = 0;  ///< box tests for each contact of the first join
+  int look_at_ = 1, surface_at_ = 1,
+      started_at_ = 0;                          ///< frames: of the next looks, of the active one's start
+  double step_ = 0, surface_ = 0;               ///< seconds; of the refitted boxes at the start
+  double segment_begin_ = 0, segment_end_ = 0;  ///< seconds
+  bool plans_changed_ = false, plans_are_old_ = false;  ///< since the last frame, since the last look
+  // Of the current frame; the counts are those at its beginning.
+  bool searches_ = false, asked_ = false, pairs_asked_ = false, only_rays_ = false;
+  double ray_tests_ = 0, found_ = 0, contacts_ = 0;  ///< found_: candidates
+  std::uint64_t span_tests_ = 0, frame_tests_ = 0, fetched_ = 0;
 };
 
 }  // namespace
@@ -527,7 +381,7 @@ KBVH_STRATEGY(auto) {
       .parameters = {{"gain",
                       "1.1",
                       {},
-                      "predicted speed-up from which on another strategy replaces the active one",
+                      "estimated speed-up from which on another strategy replaces the active one",
                       1},
                      threads_parameter("positions and the work of the chosen strategies that take threads")},
   })};

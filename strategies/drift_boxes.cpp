@@ -67,7 +67,7 @@ class DriftStrategy : public CountedStrategy<S>,
       std::fill_n(body.rate_high, 3, 0.0);
       body.watch = may_move(index) ? Watch::drift : Watch::nothing;
       make_boxes(index);
-      body.leaf_size = usual_leaf_side(hierarchies_[index]);
+      body.leaf_size = usual_leaf_side(hierarchies_[index], sides_);
       remember(index);
     }
     // A body that rests again may have been moved by its own plans before.
@@ -161,7 +161,7 @@ class DriftStrategy : public CountedStrategy<S>,
     for (const auto& lists : lists_of_) total += lists.bytes();
     for (const auto& rows : rows_) total += rows.bytes();
     return total + work_.bytes() + probes_.bytes() + near_bodies_.bytes() + pair_is_near_.size() +
-           near_pairs_.capacity() * sizeof(std::uint32_t);
+           near_pairs_.capacity() * sizeof(std::uint32_t) + sides_.capacity() * sizeof(double);
   }
 
  protected:
@@ -462,6 +462,7 @@ class DriftStrategy : public CountedStrategy<S>,
   std::vector<std::uint8_t> pair_is_near_;
   std::vector<NearPairs<S>> lists_of_;  ///< [near pair]; never shrinks
   NearWork<S> work_;
+  std::vector<double> sides_;  ///< of the leaves of a body, at a reset
   WideQuery<S> query_{this->scene_, this->sampled_};
   DriftProbes<S> probes_{this->scene_, this->sampled_};
   DriftModel model_;

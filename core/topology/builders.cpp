@@ -1,6 +1,7 @@
 #include "core/topology/builders.hpp"
 
 #include "core/topology/collapse.hpp"
+#include "core/topology/median_order.hpp"
 #include "core/topology/median_tree.hpp"
 
 #include <algorithm>
@@ -46,21 +47,12 @@ struct BinaryNode {
   double weight = 0;                  // priority for opening a child when collapsing
 };
 
-struct BuildItem {
-  std::array<double, 3> centroid;
-  std::uint32_t primitive;
-};
-
 template <class S>
 class BinaryBuilder {
  public:
   BinaryBuilder(std::span<const Box<S>> boxes, const BuilderConfig& config) : boxes_(boxes), config_(config) {
-    items_.resize(boxes.size());
-    for (std::uint32_t p = 0; p < boxes.size(); ++p) {
-      for (std::size_t axis = 0; axis < 3; ++axis)
-        items_[p].centroid[axis] = 0.5 * double(boxes[p].lower[axis]) + 0.5 * double(boxes[p].upper[axis]);
-      items_[p].primitive = p;
-    }
+    items_.reserve(boxes.size());
+    for (std::uint32_t p = 0; p < boxes.size(); ++p) items_.push_back(build_item(boxes[p], p));
     if (config.method == BuildMethod::morton) sort_by_morton_code();
   }
 
@@ -89,16 +81,7 @@ class BinaryBuilder {
 
   /// Moves the primitives of [begin, end) with the smallest centroids along the longest axis before `middle`.
   void median_split(std::uint32_t begin, std::uint32_t middle, std::uint32_t end) {
-    std::array<double, 3> lower, upper;
-    centroid_bounds(begin, end, lower, upper);
-    std::size_t axis = 0;
-    for (std::size_t a = 1; a < 3; ++a)
-      if (upper[a] - lower[a] > upper[axis] - lower[axis]) axis = a;
-    std::nth_element(items_.begin() + begin, items_.begin() + middle, items_.begin() + end,
-                     [axis](const BuildItem& a, const BuildItem& b) {
-                       return a.centroid[axis] != b.centroid[axis] ? a.centroid[axis] < b.centroid[axis]
-                                                                   : a.primitive < b.primitive;
-                     });
+    split_at_median(range(begin, end), middle - begin);
   }
 
  private:
@@ -117,8 +100,8 @@ class BinaryBuilder {
 
   std::uint32_t sah_split(std::uint32_t begin, std::uint32_t end) {
     const std::uint32_t count = end - begin, bins = config_.sah_bins;
-    std::array<double, 3> lower, upper;
-    centroid_bounds(begin, end, lower, upper);
+    const CentroidBounds bounds(range(begin, end));
+    const auto &lower = bounds.lower, &upper = bounds.upper;
     double best_cost = std::numeric_limits<double>::infinity();
     std::size_t best_axis = 3;
     std::uint32_t best_bin = 0, best_larger = 0;
@@ -178,8 +161,8 @@ class BinaryBuilder {
   }
 
   void sort_by_morton_code() {
-    std::array<double, 3> lower, upper;
-    centroid_bounds(0, std::uint32_t(items_.size()), lower, upper);
+    const CentroidBounds bounds(items_);
+    const auto &lower = bounds.lower, &upper = bounds.upper;
     std::vector<std::uint64_t> code(items_.size(), 0);
     for (const BuildItem& item : items_)
       for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -195,15 +178,8 @@ class BinaryBuilder {
     for (const BuildItem& item : items_) codes_.push_back(code[item.primitive]);
   }
 
-  void centroid_bounds(std::uint32_t begin, std::uint32_t end, std::array<double, 3>& lower,
-                       std::array<double, 3>& upper) const {
-    lower.fill(std::numeric_limits<double>::infinity());
-    upper.fill(-std::numeric_limits<double>::infinity());
-    for (std::uint32_t i = begin; i < end; ++i)
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        lower[axis] = std::min(lower[axis], items_[i].centroid[axis]);
-        upper[axis] = std::max(upper[axis], items_[i].centroid[axis]);
-      }
+  std::span<BuildItem> range(std::uint32_t begin, std::uint32_t end) {
+    return {items_.data() + begin, end - begin};
   }
 
   double weight(std::uint32_t begin, std::uint32_t end) const {

@@ -19,6 +19,7 @@
 #include "core/topology/builders.hpp"
 #include "core/topology/subtree_swap.hpp"
 #include "tests/support/curved_scenes.hpp"
+#include "tests/support/many_bodies.hpp"
 #include "tests/support/moving_grids.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
@@ -230,6 +231,27 @@ TEST(Allocation, NoneOfRaysOnceWarm) {
       if (!entry.info.can.rays || entry.info.rays_guarantee != Guarantee::exact) continue;
       EXPECT_EQ(allocations_of_rays(entry, in_float), "") << entry.info.id << " on " << name << ", float";
       EXPECT_EQ(allocations_of_rays(entry, in_double), "") << entry.info.id << " on " << name << ", double";
+    }
+  }
+}
+
+// Rays among many bodies have a tree over these, which every start of a strategy builds again: `auto` starts
+// strategies within a clip.
+TEST(Allocation, NoneOfTheTreeOverBodiesOnceWarm) {
+  TestScene<float> test;
+  test.scene = many_bodies<float>(70, 2);
+  for (const char* const id : {"bottom_up", "interval_join", "drift_boxes"}) {
+    Session<float> session(test.scene, {&find_strategy(id), {}, find_strategy(id).info.topology.preferred});
+    std::vector<Ray<float>> rays{{{-1, 2, 2}, {1, 0.01F, 0.02F}}, {{2, 2, -1}, {0.03F, 0.01F, 1}}};
+    std::vector<RayHit> hits(rays.size());
+    PhaseTimes times;
+    for (int round = 0; round < 3; ++round) {
+      session.reset(0.25 * round);
+      const std::uint64_t before = allocations;
+      session.probe(RayProbes<float>{RayQuery::closest, rays, std::span<RayHit>(hits)}, times);
+      if (round == 2) {
+        EXPECT_EQ(allocations - before, 0u) << id;
+      }
     }
   }
 }

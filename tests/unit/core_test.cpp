@@ -11,6 +11,7 @@
 #include "core/judge/audit.hpp"
 #include "core/judge/oracle.hpp"
 #include "core/scene/self_pairs.hpp"
+#include "core/topology/median_order.hpp"
 #include "core/topology/renumber.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
@@ -56,6 +57,33 @@ TEST(Builders, MakeSoundTopologiesOfEveryShape) {
             }
           }
     }
+  }
+}
+
+// A tree of other boxes gets the order that the builder gives to these; ties included, as some boxes are
+// equal.
+TEST(Builders, SortByMediansLikeANewTree) {
+  Random random(7);
+  for (const std::uint32_t count : {0U, 1U, 2U, 7U, 8U, 9U, 63U, 64U, 65U, 200U, 513U}) {
+    std::vector<Box<float>> before(count), now(count);
+    for (std::vector<Box<float>>* const boxes : {&before, &now})
+      for (Box<float>& box : *boxes)
+        for (int axis = 0; axis < 3; ++axis) {
+          box.lower[axis] = float(random.below(12));
+          box.upper[axis] = box.lower[axis] + float(random.below(3));
+        }
+    for (const std::uint32_t width : {2U, 4U, 8U})
+      for (const std::uint32_t leaf : {1U, 3U, 8U}) {
+        const BuilderConfig config{.method = BuildMethod::median, .width = width, .leaf_size = leaf};
+        const Topology given = build_topology<float>(before, config);
+        std::vector<BuildItem> items;
+        for (std::uint32_t p = 0; p < count; ++p) items.push_back(build_item(now[p], p));
+        sort_by_medians(given, items);
+        Topology sorted = given;
+        for (std::uint32_t i = 0; i < count; ++i) sorted.primitives[i] = items[i].primitive;
+        EXPECT_EQ(sorted, build_topology<float>(now, config))
+            << count << " boxes, width " << width << ", leaf " << leaf;
+      }
   }
 }
 

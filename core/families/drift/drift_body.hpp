@@ -139,10 +139,10 @@ struct DriftBody {
   void put_box() { box = moved_on(box_then); }
 };
 
-/// Returns the median side of the boxes of a hierarchy's leaves; 0 without leaves.
+/// Returns the median side of the boxes of a hierarchy's leaves; 0 without leaves. Replaces `sides`.
 template <class S>
-double usual_leaf_side(const WideHierarchy<S>& hierarchy) {
-  std::vector<double> sides;
+double usual_leaf_side(const WideHierarchy<S>& hierarchy, std::vector<double>& sides) {
+  sides.clear();
   for (std::uint32_t node = 0; node < hierarchy.topology().size(); ++node) {
     if (!hierarchy.topology().nodes[node].is_leaf()) continue;
     const Box<S> box = hierarchy.box(node);

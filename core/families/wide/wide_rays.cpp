@@ -35,13 +35,8 @@ void WideRays<S>::refit_bodies() {
   same = same && next == all_.ids.size();
   if (!same) {
     all_.ids.clear();
-    primitives_ = {};
     for (std::uint32_t body = 0; body < all_.sides.size(); ++body)
-      if (has_polygons(body)) {
-        const auto i = std::uint32_t(all_.ids.size());
-        primitives_.add(std::vector<std::uint32_t>{2 * i, 2 * i + 1});
-        all_.ids.push_back(body);
-      }
+      if (has_polygons(body)) all_.ids.push_back(body);
     corners_.assign(6 * all_.ids.size() + 1, S(0));
     built_area_ = -1;
   }
@@ -50,12 +45,7 @@ void WideRays<S>::refit_bodies() {
     std::copy_n(box.lower, 3, corners_.data() + 6 * i);
     std::copy_n(box.upper, 3, corners_.data() + 6 * i + 3);
   }
-  const auto build = [&] {
-    bodies_.assign(build_topology(primitives_, corners_.data(),
-                                  {.method = BuildMethod::median, .width = 8, .leaf_size = 1}),
-                   primitives_, active_kernel_set());
-  };
-  if (built_area_ < 0) build();
+  if (built_area_ < 0) build_bodies();
   if (all_.ids.empty()) return;
   bodies_.refit(corners_.data());
   if (all_.ids.size() <= 8) {  // one node, whatever its children
@@ -65,9 +55,36 @@ void WideRays<S>::refit_bodies() {
   const double area = summed_area(bodies_);
   if (built_area_ < 0) built_area_ = area;
   if (area <= bodies_worn_out * built_area_) return;
-  build();
+  build_bodies();
   bodies_.refit(corners_.data());
   built_area_ = summed_area(bodies_);
+}
+
+template <class S>
+void WideRays<S>::build_bodies() {
+  const std::size_t count = all_.ids.size();
+  if (!has_tree_ || items_.size() != count) {
+    primitives_ = {};
+    for (std::uint32_t i = 0; i < count; ++i) primitives_.add(std::vector<std::uint32_t>{2 * i, 2 * i + 1});
+    bodies_.assign(build_topology(primitives_, corners_.data(),
+                                  {.method = BuildMethod::median, .width = 8, .leaf_size = 1}),
+                   primitives_, active_kernel_set());
+    items_.resize(count);
+    // The first exchange of primitives between leaves allocates; all are exchanged now.
+    order_.assign(bodies_.topology().primitives.rbegin(), bodies_.topology().primitives.rend());
+    bodies_.refill(order_, primitives_);
+    has_tree_ = true;
+  }
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const S* const corners = corners_.data() + std::size_t(6) * i;
+    Box<S> box;
+    std::copy_n(corners, 3, box.lower);
+    std::copy_n(corners + 3, 3, box.upper);
+    items_[i] = build_item(box, i);
+  }
+  sort_by_medians(bodies_.topology(), items_);
+  for (std::size_t i = 0; i < count; ++i) order_[i] = items_[i].primitive;
+  bodies_.refill(order_, primitives_);
 }
 
 template <class S>
@@ -139,11 +156,11 @@ void WideRays<S>::count_bodies(std::span<const Ray<S>> rays, RayBodies& bodies) 
 
 template <class S>
 std::size_t WideRays<S>::bytes() const {
-  std::size_t total =
-      bodies_.bytes() +
-      (primitives_.offsets.capacity() + primitives_.vertices.capacity() + all_.ids.capacity()) *
-          sizeof(std::uint32_t) +
-      corners_.capacity() * sizeof(S);
+  std::size_t total = bodies_.bytes() +
+                      (primitives_.offsets.capacity() + primitives_.vertices.capacity() +
+                       all_.ids.capacity() + order_.capacity()) *
+                          sizeof(std::uint32_t) +
+                      corners_.capacity() * sizeof(S) + items_.capacity() * sizeof(BuildItem);
   for (const WideRayRunner<S>& runner : runners_) total += runner.bytes();
   return total;
 }

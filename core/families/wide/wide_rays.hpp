@@ -6,6 +6,7 @@
 #include "core/families/wide/wide_hierarchy.hpp"
 #include "core/families/wide/wide_probes.hpp"
 #include "core/families/wide/wide_ray_runner.hpp"
+#include "core/topology/median_order.hpp"
 
 namespace kbvh {
 
@@ -13,7 +14,8 @@ namespace kbvh {
 ///
 /// A tree over the bodies' boxes, refitted at each call and rebuilt when the bodies have mixed, leads to the
 /// bodies, which are searched nearest first. This is occlusion culling: a body behind the hits of all rays is
-/// never searched, its positions are not fetched, and none of its stale boxes are made.
+/// never searched, its positions are not fetched, and none of its stale boxes are made. A rebuild uses the
+/// memory of the first build.
 ///
 /// If all boxes and positions are current, the threads of the motion (SampledMotion::workers) share the rays
 /// of a call: with the same hits and the same counts.
@@ -37,6 +39,8 @@ class WideRays {
   static constexpr std::size_t rays_at_once = 4 * WideRayBlock<S>::size;
 
   void refit_bodies();
+  /// Builds the tree over `corners_`. Allocates only for another number of bodies than the last time.
+  void build_bodies();
   /// Returns whether several threads may answer: no body changes while they do.
   bool can_be_shared() const;
 
@@ -45,7 +49,10 @@ class WideRays {
   // The tree over bodies: one primitive of two corners for each body that rays can meet.
   WideHierarchy<S> bodies_;
   Primitives primitives_;
-  std::vector<S> corners_;  ///< [primitive][lower, upper][3], one scalar past the end
+  std::vector<S> corners_;            ///< [primitive][lower, upper][3], one scalar past the end
+  std::vector<BuildItem> items_;      ///< [primitive], while the tree is built
+  std::vector<std::uint32_t> order_;  ///< primitives by entry of the tree
+  bool has_tree_ = false;
   double built_area_ = -1;  ///< sum over its nodes when it was built; negative: to be built
   std::vector<WideRayRunner<S>> runners_;
 };
