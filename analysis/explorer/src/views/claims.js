@@ -47,7 +47,7 @@ export function claims({ model }) {
           make(
             "div",
             {},
-            one.paper && make("p", { class: "note", text: `${one.id.startsWith("T") ? "Bound" : "Paper"}: ${one.paper}` }),
+            one.paper && make("p", { class: "note", text: `${one.id.startsWith("E") ? "Paper" : "Bound"}: ${one.paper}` }),
             one.corners?.length > 0 && [
               make("p", { class: "note", text: "Measured factors, without motion evaluation, of each pair that is compared:" }),
               make(
