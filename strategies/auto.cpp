@@ -91,20 +91,16 @@ class Auto final : public OneOfMany<S>,
 
   QueryStatus find_candidates(double t, PairBuffer& out, const Budget& /*budget*/) override {
     const std::size_t before = out.size();
-    QueryStatus status;
-    bool done = false;
-    if (policy_->state() == ChoiceState::tries && active().info->can.time_budget) {
-      status = active().strategy->candidates_at(t, out, {most_box_tests()});
-      done = status.complete();
-      if (!done) {
-        out.resize(before);
-        stop(t);
-      }
-    } else {
-      stop_endless_join(t);
-    }
     // Not all candidates honour a budget.
-    if (!done) status = active().strategy->candidates_at(t, out, {});
+    const bool limited = policy_->state() == ChoiceState::tries && active().info->can.time_budget;
+    if (!limited) stop_endless_join(t);
+    QueryStatus status =
+        active().strategy->candidates_at(t, out, limited ? Budget{most_box_tests()} : Budget{});
+    if (limited && !status.complete()) {
+      out.resize(before);
+      stop(t);
+      status = active().strategy->candidates_at(t, out, {});
+    }
     see(out.size() - before);
     return status;
   }

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 
+#include "core/geometry/box.hpp"
 #include "core/topology/topology.hpp"
 
 namespace kbvh {
