@@ -155,6 +155,36 @@ TEST(CurvedContacts, AreThoseOfEveryFeatureWithEveryOther) {
   EXPECT_GT(contacts, 100u);
 }
 
+// The vertex with the least x at both ends flies an arc, above a vertex at rest: the box of the triangle ends
+// at that one meanwhile. The straight line from end to end is outside of this box when the other body passes.
+TEST(CurvedContacts, LinesOutsideOfTheBoxesOfCurvesAreSwept) {
+  Scene<float> scene;
+  for (int body = 0; body < 2; ++body) {
+    Body<float> made;
+    made.primitives.add(std::vector<std::uint32_t>{0, 1, 2});
+    std::vector<float> positions;
+    std::vector<SegmentBends<float>> bends;
+    for (const float y : {1.0F, -1.0F}) {
+      const std::vector<float> at = body == 0
+                                        ? std::vector<float>{0, 0, 0, 0.5F, 0, 1, 2, 0, -1}
+                                        : std::vector<float>{0.1F, y, 0, 0.12F, y, 0.02F, 0.1F, y, 0.04F};
+      positions.insert(positions.end(), at.begin(), at.end());
+    }
+    if (body == 0) bends.push_back({{8, 0, 0, 0, 0, 0, 0, 0, 0}, std::vector<float>(9)});
+    made.plans = FlightPlans<float>(3, {0, 1}, std::move(positions), std::move(bends));
+    scene.bodies.push_back(std::move(made));
+  }
+  scene.pairs = all_pairs(scene.bodies);
+  const Truth<float> truth = truth_of(scene);
+  EXPECT_GT(truth.total, 0u);
+  for (const StrategyEntry& entry : registry()) {
+    if (!entry.info.can.contacts || !entry.info.can.curves) continue;
+    BuilderConfig builder = entry.info.topology.preferred;
+    if (!entry.info.topology.own) builder.leaf_size = 1;
+    expect_contacts(entry, scene, truth, builder, 2, entry.info.id);
+  }
+}
+
 TEST(ContactScenes, HaveContacts) {
   for (const char* name : {"soups", "four_bodies_own_keyframes", "self_rolled_cloth"}) {
     const Truth<float> truth = truth_of(synthetic_scene<float>(name).scene);
