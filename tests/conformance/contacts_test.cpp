@@ -6,9 +6,11 @@
 
 #include <algorithm>
 #include <map>
+#include <utility>
 
 #include "core/judge/oracle.hpp"
 #include "core/judge/session.hpp"
+#include "tests/support/curved_scenes.hpp"
 #include "tests/support/synthetic_scenes.hpp"
 
 namespace kbvh::test::contacts_test {
@@ -34,8 +36,8 @@ struct Truth {
 };
 
 template <class S>
-Truth<S> truth_of(const Scene<S>& scene) {
-  Truth<S> truth{overlaid_keyframes(scene), {}};
+Truth<S> truth_of(const Scene<S>& scene, std::vector<double> knots) {
+  Truth<S> truth{std::move(knots), {}};
   ContactFinder<S> finder(scene);
   Playback<S> playback(scene);
   for (std::size_t k = 0; k + 1 < truth.knots.size(); ++k) {
@@ -60,6 +62,11 @@ Truth<S> truth_of(const Scene<S>& scene) {
     truth.contacts.push_back(std::move(all));
   }
   return truth;
+}
+
+template <class S>
+Truth<S> truth_of(const Scene<S>& scene) {
+  return truth_of(scene, overlaid_keyframes(scene));
 }
 
 template <class S>
@@ -117,6 +124,66 @@ TEST_P(Contacts, AreThoseOfEveryFeatureWithEveryOther) {
 
 INSTANTIATE_TEST_SUITE_P(Scenes, Contacts, testing::ValuesIn(scene_names()),
                          [](const auto& test) { return test.param; });
+
+// Contacts are those of straight lines between two frames, which leave the curves and their boxes.
+template <class S>
+std::size_t expect_contacts_on_curves(const std::string& name) {
+  const Scene<S> scene = curved_scene<S>(name).scene;
+  std::vector<double> knots = overlaid_keyframes(scene);
+  for (std::size_t k = knots.size() - 1; k-- > 0;)
+    knots.insert(knots.begin() + std::ptrdiff_t(k) + 1, 0.5 * (knots[k] + knots[k + 1]));
+  const Truth<S> truth = truth_of(scene, knots);
+  std::size_t played = 0;
+  for (const StrategyEntry& entry : registry()) {
+    if (!entry.info.can.contacts || !entry.info.can.curves) continue;
+    for (const std::uint32_t leaf : {1u, 3u}) {
+      BuilderConfig builder = entry.info.topology.preferred;
+      if (!entry.info.topology.own) builder.leaf_size = leaf;
+      expect_contacts(entry, scene, truth, builder, 2, entry.info.id + " on " + name);
+    }
+    ++played;
+  }
+  EXPECT_GT(played, 2u);
+  return truth.total;
+}
+
+TEST(CurvedContacts, AreThoseOfEveryFeatureWithEveryOther) {
+  EXPECT_TRUE(find_strategy("kinetic_separation_list").info.can.contacts);
+  std::size_t contacts = 0;
+  for (const char* const name : {"curved_soups", "curved_thrown", "curved_gravity", "curved_mixed"})
+    contacts += expect_contacts_on_curves<float>(name) + expect_contacts_on_curves<double>(name);
+  EXPECT_GT(contacts, 100u);
+}
+
+// The vertex with the least x at both ends flies an arc, above a vertex at rest: the box of the triangle ends
+// at that one meanwhile. The straight line from end to end is outside of this box when the other body passes.
+TEST(CurvedContacts, LinesOutsideOfTheBoxesOfCurvesAreSwept) {
+  Scene<float> scene;
+  for (int body = 0; body < 2; ++body) {
+    Body<float> made;
+    made.primitives.add(std::vector<std::uint32_t>{0, 1, 2});
+    std::vector<float> positions;
+    std::vector<SegmentBends<float>> bends;
+    for (const float y : {1.0F, -1.0F}) {
+      const std::vector<float> at = body == 0
+                                        ? std::vector<float>{0, 0, 0, 0.5F, 0, 1, 2, 0, -1}
+                                        : std::vector<float>{0.1F, y, 0, 0.12F, y, 0.02F, 0.1F, y, 0.04F};
+      positions.insert(positions.end(), at.begin(), at.end());
+    }
+    if (body == 0) bends.push_back({{8, 0, 0, 0, 0, 0, 0, 0, 0}, std::vector<float>(9)});
+    made.plans = FlightPlans<float>(3, {0, 1}, std::move(positions), std::move(bends));
+    scene.bodies.push_back(std::move(made));
+  }
+  scene.pairs = all_pairs(scene.bodies);
+  const Truth<float> truth = truth_of(scene);
+  EXPECT_GT(truth.total, 0u);
+  for (const StrategyEntry& entry : registry()) {
+    if (!entry.info.can.contacts || !entry.info.can.curves) continue;
+    BuilderConfig builder = entry.info.topology.preferred;
+    if (!entry.info.topology.own) builder.leaf_size = 1;
+    expect_contacts(entry, scene, truth, builder, 2, entry.info.id);
+  }
+}
 
 TEST(ContactScenes, HaveContacts) {
   for (const char* name : {"soups", "four_bodies_own_keyframes", "self_rolled_cloth"}) {
