@@ -1,6 +1,6 @@
 // Figures: a plot, its title and reading, points that lead to their runs by mouse and by keyboard, and its numbers.
 import * as Plot from "@observablehq/plot";
-import { make, paintOf, symbol } from "./dom.js";
+import { hintScrolling, make, paintOf, symbol } from "./dom.js";
 import { quantile } from "./statistics.js";
 import { tick } from "./words.js";
 
@@ -310,10 +310,11 @@ export function figure({ title, reading, plot, points = [], table, choose, least
 
 /** Makes a figure's numbers, folded; the table is made when it is opened. */
 function numbers({ head, rows }) {
-  const details = make("details", { class: "numbers" }, make("summary", { text: "Numbers" }));
+  const details = make("details", { class: "numbers" }, make("summary", { text: `Numbers (${rows.length} ${rows.length === 1 ? "row" : "rows"})` }));
   details.addEventListener("toggle", () => {
     if (!details.open || details.children.length > 1) return;
     details.append(make("div", { class: "scroll", tabindex: 0 }, tableOf(head, rows)));
+    hintScrolling(details);
   });
   return details;
 }

@@ -5,7 +5,7 @@ import { facetOf, selected } from "./model.js";
 const NAMES = {
   plan: "Study",
   scene: "Scene",
-  size: "Size (primitives)",
+  size: "Triangles (both bodies)",
   l: "l (frames per keyframe)",
   scalar: "Scalar",
   machine: "Machine",
