@@ -150,7 +150,9 @@ class Advice:
     refit: str = "the best refit"  #: what it is compared with: one refit's title if that is the best one in all cells
     doubtful: list[tuple[str, float]] = field(default_factory=list)  #: cells that were measured on a disturbed machine, and their speeds
     slower: int = 0  #: cells in which it is slower than the best refit
-    unsure: int = 0  #: other cells in which the interval of its ratio has 1, or the machine was disturbed
+    unsure: int = 0  #: other cells in which the interval of its ratio contains 1, or the machine was disturbed
+    why: str = ""  #: which of the two
+    at: tuple[str, str] = ("", "")  #: scenes of the cells with the shortest, and the longest time
 
     @property
     def says(self) -> str:
@@ -198,7 +200,7 @@ class Advice:
             return f"surely faster: no, {self.slower} of {text.plural(self.measured, self.word)} {'is' if self.slower == 1 else 'are'} slower"
         if self.unsure:
             which = f"{self.unsure} of {text.plural(self.measured, self.word)}" if self.measured > 1 else every
-            return f"surely faster: not beyond doubt, in {which} the interval has 1 or the run is doubtful"
+            return f"surely faster: not beyond doubt, in {which} {self.why}"
         return f"surely faster: yes, in {every}, intervals included"
 
     @property
@@ -208,7 +210,8 @@ class Advice:
         small, large = (text.size(one) for one in self.sizes)
         if low == high and small == large:
             return f"{low} ms a frame ({small} triangles)"
-        return f"{low} ms ({small}) to {high} ms ({large} triangles) a frame"
+        first, last = (f"{one}, " if one else "" for one in self.at)
+        return f"{low} ms ({first}{small}) to {high} ms ({last}{large} triangles) a frame"
 
 
 @dataclass
@@ -317,6 +320,7 @@ def advise(own: Sequence[Cell], known: str) -> Optional[Advice]:
     by_time = sorted(measured, key=lambda cell: (cell.times[best], cell.primitives))
     ends = by_time[0], by_time[-1]
     facts = measured[0].facts[best]
+    unsure = [] if facts.baseline else [why for cell in measured if (why := _unsure(cell, best))]
     refits = {cell.best_refit for cell in measured}
     one_refit = next(iter(refits)) if len(refits) == 1 else ""
     scenes = {cell.title.split(", ")[0] for cell in own}
@@ -327,14 +331,21 @@ def advise(own: Sequence[Cell], known: str) -> Optional[Advice]:
         word="scene" if len(scenes) == len(own) else "cell", faster=sum(cell.speeds[best] > 1 for cell in measured),
         refit=f"the {measured[0].facts[one_refit].title}" if one_refit in measured[0].facts else "the best refit",
         doubtful=[(cell.title, cell.speeds[best]) for cell in measured if best in cell.doubtful],
-        slower=sum(cell.speeds[best] < 1 for cell in measured), unsure=0 if facts.baseline else sum(_unsure(cell, best) for cell in measured),
+        slower=sum(cell.speeds[best] < 1 for cell in measured), unsure=len(unsure), why=" or ".join(dict.fromkeys(unsure)),
+        at=(ends[0].title.split(", ")[0], ends[1].title.split(", ")[0]) if len(scenes) > 1 else ("", ""),
     )  # fmt: skip
 
 
-def _unsure(cell: Cell, id: str) -> bool:
-    """Returns whether a strategy that is not slower in a cell may be: no interval lies above 1 (a single round has none), or its run is doubtful."""
+def _unsure(cell: Cell, id: str) -> str:
+    """Says why a strategy that is not slower in a cell may be: "" if it is sure, or slower. A single round has no interval."""
+    if cell.speeds[id] < 1:
+        return ""
+    if id in cell.doubtful:
+        return "the run is doubtful"
     span = cell.span(id)
-    return cell.speeds[id] >= 1 and (id in cell.doubtful or span is None or not 1 < span[0] < span[1])
+    if span is None or span[0] >= span[1]:
+        return "there is no interval"
+    return "" if span[0] > 1 else "the interval contains 1"
 
 
 def records(every: Sequence[Cell]) -> dict[str, Record]:

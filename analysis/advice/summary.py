@@ -111,8 +111,8 @@ def paper(claims: Claims, folder: Path, reference: Path = REFERENCE) -> Paper:
 
 #: The corners that the question of MAIN is answered in: the refit, the tree, and how a condition names both.
 ASKED = (
-    ("best:2006", "Against a refit as in 2006", "tuned here", "tuned here against the refit of 2006"),
-    ("2006:2006", "Against a refit as in 2006", "built as in 2006", "built as in 2006 against the refit of 2006"),
+    ("best:2006", "Against a refit as in 2006", "if tuned here", "tuned here against the refit of 2006"),
+    ("2006:2006", "Against a refit as in 2006", "if built as in 2006", "built as in 2006 against the refit of 2006"),
     ("best:best", "Against today's best refit", "", "tuned here against today's best refit"),
 )
 #: The best kinetic tree of any kind against today's best refit, where the positions that it need not evaluate count.

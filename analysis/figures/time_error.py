@@ -217,7 +217,7 @@ def sentences(study: Study, place: Place) -> list[str]:
             other = f"the fastest exact one, {exact.name}, takes {text.milliseconds(exact.time)}\u00a0ms a frame"
             wins = few.time < exact.time
             times = _times_as_fast(study, few, exact) if wins else _times_as_fast(study, exact, few)
-            says += f"{allowing}is {times}: {one}; {other}." if wins else f"{allowing}gains nothing: {other}, {times} as the fastest with errors ({one})."
+            says += f"{allowing}is {times}: {one}; {other}." if wins else f"{allowing}gains nothing: {other} and is {times} as the fastest with errors ({one})."
         told[exact.contestant, few.contestant if few else ""] = says
     return list(told.values())
 

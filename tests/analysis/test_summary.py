@@ -64,8 +64,8 @@ class TestPaper(unittest.TestCase):
         self.write([{"id": "E3", "verdict": claims.CONDITION, "brief": "", "corners": corners, "ours": {id: span for id, (span, _) in known.items()}}])
         self.assertEqual(
             summary.parts_on_the_paper(self.paper(row("E3", claims.OPEN)))[0],
-            "Is updating a kinetic AABB tree faster than a bottom-up refit? Against a refit as in 2006: yes tuned here (1.04 to 40.1 times as fast), "
-            "not always built as in 2006 (0.037 to 3.35 times as fast). Against today's best refit: no (0.0081 to 0.66 times as fast). Claim E3 (E3) holds "
+            "Is updating a kinetic AABB tree faster than a bottom-up refit? Against a refit as in 2006: yes if tuned here (1.04 to 40.1 times as fast), "
+            "not always if built as in 2006 (0.037 to 3.35 times as fast). Against today's best refit: no (0.0081 to 0.66 times as fast). Claim E3 (E3) holds "
             "with a condition: tuned here against the refit of 2006 met from 3 frames a keyframe on; built as in 2006 against the refit of 2006 met nowhere; tuned here "
             "against today's best refit met at 2 of 3 points (the reference run).",
         )
@@ -118,7 +118,7 @@ class TestSentences(unittest.TestCase):
         said = self.said([line("refit", 2.0), other("join", 1.0, foresight="next_keyframe")])
         self.assertEqual(
             "With 10 frames a keyframe and more, take refit where nothing is known: the best refit in the only scene, at 2.00 ms a frame (4k triangles); "
-            "join if the next keyframe is known: 2.00 times as fast as the refit (in 1 scene), at 1.00 ms a frame (4k triangles) (surely faster: not beyond doubt, in the only scene the interval has 1 or the run is doubtful).",
+            "join if the next keyframe is known: 2.00 times as fast as the refit (in 1 scene), at 1.00 ms a frame (4k triangles) (surely faster: not beyond doubt, in the only scene there is no interval).",
             said["What to take"].split(" This study")[0],
         )
         self.assertIn("This study has at most 4k triangles, both bodies together.", said["What to take"])

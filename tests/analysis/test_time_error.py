@@ -96,7 +96,7 @@ class TestTimeError(unittest.TestCase):
     def test_where_an_error_buys_nothing_it_says_so(self) -> None:
         study = self.study([exact("refit", 1.0), wrong("good", 1.5, 1), wrong("bad", 0.5, 500)])
         (place,) = time_error.places(study)
-        self.assertRegex(time_error.sentences(study, place)[0], r"allowing 1\u00a0% missed pairs gains nothing: the fastest exact one, refit, takes 1\.00\u00a0ms a frame, 1\.50 times as fast")
+        self.assertRegex(time_error.sentences(study, place)[0], r"allowing 1\u00a0% missed pairs gains nothing: the fastest exact one, refit, takes 1\.00\u00a0ms a frame and is 1\.50 times as fast")
         study = self.study([exact("refit", 1.0), wrong("bad", 0.5, 500)])
         (place,) = time_error.places(study)
         self.assertIn("no approximate contestant missed less than 1\u00a0%", time_error.sentences(study, place)[0])

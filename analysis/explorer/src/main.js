@@ -398,6 +398,7 @@ function build() {
         role: "tab",
         "data-view": key,
         "aria-controls": "view",
+        "data-name": name,
         text: name,
         click: () => set({ view: key }),
       }),

@@ -170,7 +170,7 @@ function bargain(model, runs, known) {
   const other = `the fastest exact one, ${exact.contestant.title}, takes ${ms(exact)}`;
   return (
     `${known ? "If nothing of the future is known" : "Whatever is known of the future"}, allowing ${percent(FEW, 1)} missed pairs ` +
-    (wins ? `is ${times}: ${one}; ${other}.` : `gains nothing: ${other}, ${times} as the fastest with errors (${one}).`)
+    (wins ? `is ${times}: ${one}; ${other}.` : `gains nothing: ${other} and is ${times} as the fastest with errors (${one}).`)
   );
 }
 
