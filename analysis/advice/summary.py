@@ -331,7 +331,7 @@ def sentences(study: Study, found: Sequence[Situation], errors: Sequence[time_er
     place = next((anchor for asks, anchor in advice.ANCHORS.items() if any(one.asks == asks for one in found)), "kept" if kept_cells() else "limits")
     new = [one for situation in found if situation.asks in advice.ANCHORS for one in advice.recommended(situation) if one not in told]
     said.append(Sentence("Self-collision, rays", [part for part in [*parts_on_others(found), methods.explained(new)] if part], place))
-    said.append(Sentence("Time against error", [on_errors(errors)], "errors" if errors else "limits"))
+    said.append(Sentence("Time against error", errors[0].sentences if errors else [on_errors(errors)], "errors" if errors else "limits"))
     said.append(Sentence("The paper", parts_on_the_paper(known), "claims"))
     said.append(Sentence("This run", [on_disturbance(study)], "limits"))
     return said

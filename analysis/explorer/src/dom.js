@@ -37,7 +37,7 @@ export function symbol(contestant) {
 
 /** Returns the colour of a contestant, in the page's scheme. */
 export function paintOf(contestant) {
-  return `var(--contestant-${contestant.index})`;
+  return contestant.paint ?? `var(--contestant-${contestant.index})`;
 }
 
 /** Returns the declarations of all contestants' colours, in one scheme. */

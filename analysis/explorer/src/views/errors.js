@@ -57,6 +57,24 @@ const ERRORS = {
   },
 };
 
+/** Colours and markers of the approximate strategies, in the order of their ids: those of analysis/figures/time_error_panels.py. */
+const COLOURS = ["#D55E00", "#009E73", "#AA4499", "#E69F00", "#56B4E9", "#8C7A00", "#CC79A7", "#A8324A", "#5D4A9C", "#117733"];
+const MARKERS = ["o", "s", "^", "D", "v", "p", "<", "h", ">", "d"];
+
+/** Returns, for each approximate strategy, a contestant that looks unlike the others: their family has one colour. */
+function apart(model) {
+  const approximate = model.contestants.filter((one) => one.guarantee === "approximate");
+  const ids = [...new Set(approximate.map((one) => one.id))].sort();
+  return new Map(
+    ids.map((id, i) => {
+      const first = approximate.find((one) => one.id === id);
+      const corners = model.data.palette.corners[MARKERS[i % MARKERS.length]] ?? [];
+      const paint = `color-mix(in srgb, ${COLOURS[i % COLOURS.length]} 80%, var(--ink))`;
+      return [id, { ...first, paint, look: { ...first.look, corners, filled: true } }];
+    }),
+  );
+}
+
 export function errors(context) {
   const { model, state } = context;
   const cell = context.cell;
@@ -64,8 +82,9 @@ export function errors(context) {
   const runs = selected(model, { ...state, contestants: "all" }).filter(
     (run) => run.cell === cell && value(model, run, state.measure) > 0,
   );
+  const looks = apart(model);
   const figures = Object.values(ERRORS)
-    .map((error) => one(context, error, runs))
+    .map((error) => one(context, error, runs, looks))
     .filter(Boolean);
   if (!figures.length)
     return [
@@ -81,11 +100,11 @@ export function errors(context) {
       text: `Every contestant and setting of one cell, those without a guarantee included: ${cell.title}. Down and to the left is better; the line joins those that no other beats in both.`,
     }),
     make("div", { class: "pair" }, figures),
-    context.legend([...new Set(runs.map((run) => run.contestant.id))]),
+    context.legendList([...new Map(runs.map(({ contestant: one }) => [one.id, [looks.get(one.id) ?? one, one.title]])).values()]),
   ];
 }
 
-function one({ model, state, choose }, error, runs) {
+function one({ model, state, choose }, error, runs, looks) {
   const usable = runs
     .map((run) => ({ run, time: value(model, run, state.measure), error: error.of(run) }))
     .filter((p) => p.error !== null && p.error >= 0);
@@ -99,7 +118,8 @@ function one({ model, state, choose }, error, runs) {
   const beside = Math.sqrt(zero * axis.domain[0]);
   const points = usable.map((p) => {
     const [y, side] = times.clip(p.time);
-    return { ...p, x: p.error === 0 ? zero : p.error, y, side, paint: paintOf(p.run.contestant) };
+    const look = looks.get(p.run.contestant.id) ?? p.run.contestant;
+    return { ...p, look, x: p.error === 0 ? zero : p.error, y, side, paint: paintOf(look) };
   });
   const front = pareto(points);
   const measure = MEASURES[state.measure];
@@ -121,7 +141,7 @@ function one({ model, state, choose }, error, runs) {
       marks: [
         Plot.ruleX([beside], { stroke: "var(--line)", strokeDasharray: "2 3" }),
         Plot.line(front, { x: "x", y: "y", stroke: "var(--soft)", strokeWidth: 1, curve: "step-after" }),
-        ...points.map((p) => Plot.dot([p], { x: "x", y: "y", ...dotLook(p.run.contestant, 4.5) })),
+        ...points.map((p) => Plot.dot([p], { x: "x", y: "y", ...dotLook(p.look, 4.5) })),
         clippedMarks(points, "y"),
       ],
     }),
@@ -129,6 +149,7 @@ function one({ model, state, choose }, error, runs) {
       x: p.x,
       y: p.y,
       run: p.run,
+      looks: p.look,
       current: p.run.key === state.point,
       lines: [
         p.run.contestant.label,

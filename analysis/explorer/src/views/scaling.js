@@ -134,7 +134,7 @@ export function sweepFigure({ model, state, choose }, sweep, field, strong) {
         return hit ? measure.format(value(model, hit.run, state.measure)) : "–";
       }),
     ]);
-    return { series, own, pale: !strong.has(name) };
+    return { series, own, pale: !strong.has(name), best: name === [...strong][0] };
   });
   const guides =
     field === "l"
@@ -178,7 +178,7 @@ export function sweepFigure({ model, state, choose }, sweep, field, strong) {
           .map(({ series, own }) =>
             Plot.line(own, { x: "x", y: "y", ...lineLook(series.contestant, 1), strokeOpacity: 0.35 }),
           ),
-        ...lines.filter((line) => !line.pale).flatMap(({ series, own }) => [
+        ...lines.filter((line) => !line.pale).flatMap(({ series, own, best }) => [
           Plot.ruleX(own, {
             x: "x",
             y1: "low",
@@ -187,10 +187,10 @@ export function sweepFigure({ model, state, choose }, sweep, field, strong) {
             strokeOpacity: 0.5,
             strokeWidth: 2.4,
           }),
-          Plot.line(own, { x: "x", y: "y", ...lineLook(series.contestant, 1.5) }),
+          Plot.line(own, { x: "x", y: "y", ...lineLook(series.contestant, best ? 3 : 1.5) }),
           Plot.dot(
             own.filter((p) => !p.side),
-            { x: "x", y: "y", ...dotLook(series.contestant, 4) },
+            { x: "x", y: "y", ...dotLook(series.contestant, best ? 5.5 : 4) },
           ),
         ]),
         clippedMarks(

@@ -21,6 +21,7 @@ export function unmeasured({ model, state, set }, found, best) {
   const other = known && !(best && known.frames === found.near.frames && known.size === found.near.size) ? known : null;
   const lead = ({ frames, size }) =>
     make("button", { type: "button", class: "quiet", text: situation(frames, size), click: () => set({ frames, large: size }) });
+  const refits = found.frames === "1" && best?.contestant.baseline && found.near.frames !== "1";
   const scene = found.scene ? `${sceneWords(found.scene)}, ` : "";
   return make(
     "section",
@@ -39,7 +40,7 @@ export function unmeasured({ model, state, set }, found, best) {
         { class: own ? "note nearest" : "nearest" },
         "Nearest in these results: ",
         lead(found.near),
-        `. There, where ${KNOWN[state.know].words}, take ${best.contestant.title}: ${costText(model, best)}${best.cells === 1 ? ` on ${best.own[0].cell.title}` : ""}; ${speedText(best)}.`,
+        `. There, where ${KNOWN[state.know].words}, take ${best.contestant.title}: ${costText(model, best)}${best.cells === 1 ? ` on ${best.own[0].cell.title}` : ""}; ${speedText(best)}.${refits ? " A refit uses no keyframes: it can be taken with positions only, too; its time there is not known." : ""}`,
       ),
     other && make("p", { class: "kept-near" }, "The project's own measurements have it with ", lead(other), "."),
     !own && !best && !other && make("p", { text: "Nothing near it was measured, either." }),
