@@ -310,6 +310,44 @@ await check("the answer leads to the paper's claims, whose first sentence is tha
   leave(page);
 });
 
+await check("time against error opens where contestants err, with missed pairs first and what they buy on top", async () => {
+  const page = await load("merged");
+  const [wanted, chosen, others, titles, said, share] = await page.evaluate(() => {
+    const { model, set } = window.explorer;
+    const wrong = model.contestants.find((one) => one.id === "top_down");
+    wrong.guarantee = "approximate";
+    const cell = model.cells.at(-1);
+    const run = cell.runs.find((one) => one.contestant === wrong);
+    Object.assign(run, { pairs: 1000, missed: 4, extra: 332 });
+    set({ view: "errors" });
+    const all = (selector) => [...document.querySelectorAll(selector)];
+    const select = all(".toolbar select").find((one) => one.value === cell.key);
+    for (const one of all("#view .numbers")) one.open = true;
+    return [cell.key, select?.value, [...(select?.options ?? [])].slice(1).map((one) => one.text), all("#view figure h3").map((one) => one.textContent), all(".bargain").map((one) => one.textContent), run.contestant.label];
+  });
+  assert.equal(chosen, wanted);
+  assert.ok(others.length > 1 && others.every((text) => text.endsWith(": exact contestants only")), others.join(" | "));
+  assert.deepEqual(titles.slice(0, 2), ["Missed pairs", "False pairs"]);
+  assert.match(said[0], /^(If nothing|Whatever is known) .*allowing 1\u202f% missed pairs (is [\d.]+ times as fast|gains nothing: .* and is [\d.]+ times as fast)/);
+  assert.ok(said[0].includes("missed 0.40\u202f%"), said[0]);
+  // 332 of the 1000 - 4 + 332 reported pairs are false: the share is of what was reported, as in the report.
+  await page.waitForFunction(() => document.querySelectorAll("#view .numbers table").length > 1);
+  const row = await page.evaluate(
+    (label) => [...document.querySelectorAll("#view .numbers")][1].querySelector("table").innerText.split("\n").find((line) => line.startsWith(label)),
+    share,
+  );
+  assert.match(row, /\s25\u202f%$/);
+  await page.close();
+});
+
+await check("the details of a point have all times of frames without motion", async () => {
+  const page = await open("merged", "#view=runs");
+  await page.click(".runs tbody button.name");
+  const said = await page.$$eval("#details dl div", (list) => list.map((one) => one.textContent).find((text) => text.startsWith("Frames")));
+  assert.match(said ?? "no times of frames", /^Frames, without motionmean [\d.]+ ms; half of them take more than [\d.]+ ms, one in a hundred more than [\d.]+ ms; the worst takes [\d.]+ ms$/);
+  leave(page);
+});
+
 await check("views of all situations say so, and lead to the answer", async () => {
   for (const view of ["overview", "pairwise"]) {
     const page = await open("reference", `#view=${view}`);
