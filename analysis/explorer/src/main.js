@@ -9,7 +9,7 @@ import { MEASURES, compare, entrants, model as modelOf, reference, seriesOfName,
 import { dataOf } from "./records.js";
 import { FACETS, decode, encode, initial } from "./state.js";
 import * as statistics from "./statistics.js";
-import { situations } from "./advice.js";
+import { FRAMES, classOf, situations } from "./advice.js";
 import { answer } from "./views/answer.js";
 import { claims } from "./views/claims.js";
 import { errors, errs } from "./views/errors.js";
@@ -180,7 +180,7 @@ function drawView() {
   }
   tools(view.uses, current);
   host.view.setAttribute("aria-label", view.name);
-  const mixed = ["overview", "pairwise"].includes(name) && situations(model).length > 1;
+  const mixed = ["overview", "pairwise"].includes(name) && new Set(model.cells.map((cell) => `${cell.asks}, ${classOf(FRAMES, cell.l)}`)).size > 1;
   const context = { model, state, set, choose, legend, legendList, legendOf, othersButton, cell: current?.cell };
   const count = selected(model, state).length;
   const nothing = count === 0 && !["answer", "claims"].includes(name);

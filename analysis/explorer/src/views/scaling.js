@@ -105,7 +105,7 @@ export function sweepFigure({ model, state, choose }, sweep, field, strong) {
     const series = seriesOfName(model, state, name);
     const own = line.map(({ at: x, run }) => {
       const time = value(model, run, state.measure);
-      const ends = endsOf(model, run, state.measure);
+      const ends = strong.has(name) ? endsOf(model, run, state.measure) : { low: time, high: time }; // pale lines have no bars
       const [y, side] = axis.clip(time);
       points.push({
         x,
