@@ -23,7 +23,7 @@ import pandas as pd
 from ratios import profiles, ratios
 from results import clip_times, text
 from results.load import Study
-from results.scene_names import words
+from results.scene_names import short
 
 #: What a strategy may know about motion, from least to most.
 FORESIGHT: dict[str, tuple[str, ...]] = {
@@ -48,6 +48,9 @@ SIZES: dict[str, tuple[float, float]] = {
 
 #: What is asked of a cell (`asked`), in the order of pages.
 PAIRS, SELF, RAYS = "pairs of two bodies", "pairs within a body, too", "rays"
+
+#: Ids of the first line of the table of scenes that asks one of these.
+ANCHORS = {SELF: "glance-self", RAYS: "glance-rays"}
 
 
 def asked(row: Any) -> str:
@@ -145,12 +148,18 @@ class Advice:
     word: str = "cell"  #: for one of the situation's cells: "scene" where no two are of one scene
     faster: int = 0  #: cells in which it is faster than the best refit
     refit: str = "the best refit"  #: what it is compared with: one refit's title if that is the best one in all cells
+    doubtful: list[tuple[str, float]] = field(default_factory=list)  #: cells that were measured on a disturbed machine, and their speeds
+    slower: int = 0  #: cells in which it is slower than the best refit
+    unsure: int = 0  #: other cells in which the interval of its ratio contains 1, or the machine was disturbed
+    why: str = ""  #: which of the two
+    at: tuple[str, str] = ("", "")  #: scenes of the cells with the shortest, and the longest time
 
     @property
     def says(self) -> str:
         """Writes the speed out, as in "1.6 times as fast as the best refit (faster in 7 of 8 scenes, slowest on ball, 2k, l = 10: 0.9 to 2.1)"."""
         missing = f", measured in {self.measured}" if self.measured < self.cells else ""
-        disturbed = " (the machine was disturbed)" if self.disturbed else ""
+        doubt = self._doubt
+        disturbed = f" ({doubt})" if doubt else ""
         if self.baseline and not self.best_in:
             span = text.factor(self.low) + (f" to {text.factor(self.high)}" if self.low < self.high else "")
             return f"a refit, {span} times as fast as the best one of the {self.word if self.cells == 1 else self.word + 's'}{missing}{disturbed}"
@@ -166,18 +175,43 @@ class Advice:
         elif span:
             of = f"faster in {self.faster} of {text.plural(self.measured, self.word)}, {span}"
             of += f", slowest on {self.worst}" if self.faster < self.measured else ""
-        doubt = "; the machine was disturbed" if self.disturbed else ""
+        doubt = f"; {doubt}" if doubt else ""
         mean = " on average" if self.cells > 1 else ""
         return f"{text.factor(self.speed)} times as fast as {self.refit}{mean} ({of}{missing}{doubt})"
 
     @property
+    def _doubt(self) -> str:
+        """Names the ratios that a disturbed machine makes doubtful, each with its cell."""
+        if not self.disturbed:
+            return ""
+        if self.cells == 1 or not self.doubtful:
+            return "a doubtful run: the machine was disturbed"
+        named = [f"{text.factor(speed)} on {title}" for title, speed in self.doubtful[:2]]
+        more = f" and {len(self.doubtful) - 2} more" if len(self.doubtful) > 2 else ""
+        return f"doubtful, from a disturbed machine: {', '.join(named)}{more}"
+
+    @property
+    def sure(self) -> str:
+        """Answers in words whether it is surely faster than the best refit; "" of a refit."""
+        if self.baseline:
+            return ""
+        every = f"the only {self.word}" if self.measured == 1 else f"all {self.measured} {self.word}s"
+        if self.slower:
+            return f"surely faster: no, {self.slower} of {text.plural(self.measured, self.word)} {'is' if self.slower == 1 else 'are'} slower"
+        if self.unsure:
+            which = f"{self.unsure} of {text.plural(self.measured, self.word)}" if self.measured > 1 else every
+            return f"surely faster: not beyond doubt, in {which} {self.why}"
+        return f"surely faster: yes, in {every}, intervals included"
+
+    @property
     def costs(self) -> str:
-        """Writes the times out with the sizes that they were measured at, as in "0.12 ms (2k) to 0.64 ms (9k primitives) a frame"."""
+        """Writes the times out with the sizes that they were measured at, as in "0.12 ms (2k) to 0.64 ms (9k triangles) a frame"."""
         low, high = (text.milliseconds(one) for one in self.times)
         small, large = (text.size(one) for one in self.sizes)
         if low == high and small == large:
-            return f"{low} ms a frame ({small} primitives)"
-        return f"{low} ms ({small}) to {high} ms ({large} primitives) a frame"
+            return f"{low} ms a frame ({small} triangles)"
+        first, last = (f"{one}, " if one else "" for one in self.at)
+        return f"{low} ms ({first}{small}) to {high} ms ({last}{large} triangles) a frame"
 
 
 @dataclass
@@ -286,6 +320,7 @@ def advise(own: Sequence[Cell], known: str) -> Optional[Advice]:
     by_time = sorted(measured, key=lambda cell: (cell.times[best], cell.primitives))
     ends = by_time[0], by_time[-1]
     facts = measured[0].facts[best]
+    unsure = [] if facts.baseline else [why for cell in measured if (why := _unsure(cell, best))]
     refits = {cell.best_refit for cell in measured}
     one_refit = next(iter(refits)) if len(refits) == 1 else ""
     scenes = {cell.title.split(", ")[0] for cell in own}
@@ -295,7 +330,22 @@ def advise(own: Sequence[Cell], known: str) -> Optional[Advice]:
         times=(ends[0].times[best], ends[1].times[best]), sizes=(ends[0].primitives, ends[1].primitives),
         word="scene" if len(scenes) == len(own) else "cell", faster=sum(cell.speeds[best] > 1 for cell in measured),
         refit=f"the {measured[0].facts[one_refit].title}" if one_refit in measured[0].facts else "the best refit",
+        doubtful=[(cell.title, cell.speeds[best]) for cell in measured if best in cell.doubtful],
+        slower=sum(cell.speeds[best] < 1 for cell in measured), unsure=len(unsure), why=" or ".join(dict.fromkeys(unsure)),
+        at=(ends[0].title.split(", ")[0], ends[1].title.split(", ")[0]) if len(scenes) > 1 else ("", ""),
     )  # fmt: skip
+
+
+def _unsure(cell: Cell, id: str) -> str:
+    """Says why a strategy that is not slower in a cell may be: "" if it is sure, or slower. A single round has no interval."""
+    if cell.speeds[id] < 1:
+        return ""
+    if id in cell.doubtful:
+        return "the run is doubtful"
+    span = cell.span(id)
+    if span is None or span[0] >= span[1]:
+        return "there is no interval"
+    return "" if span[0] > 1 else "the interval contains 1"
 
 
 def records(every: Sequence[Cell]) -> dict[str, Record]:
@@ -325,10 +375,10 @@ def geometric_mean(values: Sequence[float]) -> float:
 
 def _title(row: pd.Series) -> str:
     scalar = "" if row["scalar"] == "float" else f", {row['scalar']}"
-    return f"{words(row['scene_name'])}, {text.size(row['primitives'])}, l = {row['l']:g}{scalar}"
+    return f"{short(row['scene'])}, {text.size(row['primitives'])}, l = {row['l']:g}{scalar}"
 
 
-def _changes(one: Situation) -> list[tuple[str, Advice]]:
+def changes(one: Situation) -> list[tuple[str, Advice]]:
     """Returns what is known and what to take then, without advice that more knowledge does not change."""
     found: list[tuple[str, Advice]] = []
     for known, best in one.advice:
@@ -339,13 +389,24 @@ def _changes(one: Situation) -> list[tuple[str, Advice]]:
 
 def sentence(one: Situation) -> str:
     """Writes the advice of a situation in one sentence; advice that more knowledge does not change is not repeated."""
-    parts = [f"{best.title} {'if' if i else 'where'} {known}: {best.says}, at {best.costs}" for i, (known, best) in enumerate(_changes(one))]
+    parts = [
+        f"{best.title} {'if' if i else 'where'} {known}: {best.says}, at {best.costs}{f' ({best.sure})' if best.sure else ''}"
+        for i, (known, best) in enumerate(changes(one))
+    ]
     asks = {PAIRS: "", SELF: " and pairs within a body"}.get(one.asks, f" and {one.asks}")
     begin = f"With {said_of(one.frames)}{asks}"
     return f"{begin}, take {'; '.join(parts)}." if parts else f"{begin}, no strategy was measured in half of the cells."
 
 
 def brief(one: Situation) -> str:
-    """Writes the advice of a situation shorter, for measurements that are quoted: titles and times."""
-    parts = [f"{best.title}{f' if {known}' if i else ''}, {best.costs}" for i, (known, best) in enumerate(_changes(one))]
+    """Writes the advice of a situation shorter, for measurements that are quoted: titles, times, and in how many scenes each is faster."""
+    parts = [
+        f"{best.title}{f' if {known}' if i else ''}, {best.costs}" + ("" if best.baseline else f"; {best.says}; {best.sure}")
+        for i, (known, best) in enumerate(changes(one))
+    ]
     return f"{said_of(one.frames)}: {'; '.join(parts)}"
+
+
+def recommended(one: Situation) -> list[tuple[str, str]]:
+    """Returns id and title of what is recommended in a situation, each once."""
+    return list(dict.fromkeys((best.id, best.title) for _, best in changes(one)))

@@ -62,18 +62,14 @@ def _measured(study: Study) -> list[list[str]]:
 
 
 def content(found: Cells) -> str:
-    """Returns the file for some cells. Intervals are stored for situations of one cell only: the advice tells no others."""
-    counts: dict[tuple[str, str], int] = {}
-    for cell in found.cells:
-        counts[cell.asks, cell.frames] = counts.get((cell.asks, cell.frames), 0) + 1
+    """Returns the file for some cells, with the interval of each ratio to the best refit."""
     facts = {id: cell.facts[id] for cell in found.cells for id in cell.speeds}
     lines = []
     for cell in found.cells:
-        alone = counts[cell.asks, cell.frames] == 1
         one = {
             "title": cell.title, "asks": cell.asks, "frames": cell.frames, "primitives": cell.primitives, "best_refit": cell.best_refit, "doubtful": sorted(cell.doubtful),
             "speeds": _short(cell.speeds), "times": _short(cell.times),
-            "spans": {id: [_digits(span[0]), _digits(span[1]), span[2]] for id in sorted(cell.speeds) if alone and (span := cell.span(id))},
+            "spans": {id: [_digits(span[0]), _digits(span[1]), span[2]] for id in sorted(cell.speeds) if id != cell.best_refit and (span := cell.span(id))},
         }  # fmt: skip
         lines.append(json.dumps(one, ensure_ascii=False))
     strategies = json.dumps({id: astuple(facts[id]) for id in sorted(facts)}, ensure_ascii=False)

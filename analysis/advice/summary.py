@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Optional
 
-from advice import advice, cells_file
+from advice import advice, cells_file, methods
 from advice.advice import Advice, MeasuredCell, Situation
 from claims import claims as paper_claims
 from claims.claims import CONDITION, FAILS, HOLDS, OPEN, Claims
@@ -18,7 +18,7 @@ from figures import time_error_file, time_error_panels
 from ratios import ratios
 from results import text
 from results.load import OLD_SCHEMA, Study
-from results.scene_names import words
+from results.scene_names import short
 
 REFERENCE = Path(__file__).resolve().parents[1] / "reference"
 #: The claim that the paper's abstract makes: kinetic trees are updated faster than by a refit.
@@ -64,6 +64,11 @@ class Verdict:
         """Returns the id of each corner of a claim with one check, the range without motion evaluation, and where it is met."""
         return [(one["id"], self.ours[one["id"]].split(",")[0], str(one.get("rule", ""))) for one in self.corners if one["id"] in self.ours]
 
+    def span(self, id: str) -> tuple[str, str]:
+        """Returns the ranges of a corner, without and with motion evaluation, and where it is met; empty texts without that corner."""
+        rule = next((str(corner.get("rule", "")) for corner in self.corners if corner["id"] == id), "")
+        return self.ours.get(id, ""), rule
+
     @property
     def differs(self) -> bool:
         """Returns whether both decide it and disagree."""
@@ -106,10 +111,12 @@ def paper(claims: Claims, folder: Path, reference: Path = REFERENCE) -> Paper:
 
 #: The corners that the question of MAIN is answered in: the refit, the tree, and how a condition names both.
 ASKED = (
-    ("best:2006", "Against a refit as in 2006", "at its best", "at its best against the refit of 2006"),
-    ("2006:2006", "Against a refit as in 2006", "as in 2006", "as in 2006 against the refit of 2006"),
-    ("best:best", "Against today's best refit", "", "at its best against today's best refit"),
+    ("best:2006", "Against a refit as in 2006", "if tuned here", "tuned here against the refit of 2006"),
+    ("2006:2006", "Against a refit as in 2006", "if built as in 2006", "built as in 2006 against the refit of 2006"),
+    ("best:best", "Against today's best refit", "", "tuned here against today's best refit"),
 )
+#: The best kinetic tree of any kind against today's best refit, where the positions that it need not evaluate count.
+OTHERS = "any:best"
 
 
 def on_the_main_claim(one: Verdict) -> str:
@@ -125,7 +132,18 @@ def on_the_main_claim(one: Verdict) -> str:
         return f"{claim} {one.verdict} ({by})."
     said = ". ".join(f"{refit}: {', '.join(parts)}" for refit, parts in answers.items())
     where = "; ".join(f"{name} {_plain(known[id][1])}" for id, _, _, name in ASKED if id in known and known[id][1])
-    return f"Is updating a kinetic AABB tree faster than a bottom-up refit? {said}. {claim} {one.verdict}{f': {where}' if where else ''} ({by})."
+    return f"Is updating a kinetic AABB tree faster than a bottom-up refit? {said}.{_on_others(one)} {claim} {one.verdict}{f': {where}' if where else ''} ({by})."
+
+
+def _on_others(one: Verdict) -> str:
+    """Says whether another kinetic tree beats today's best refit where the evaluation of positions counts; "" if none does or it is not known."""
+    spans, rules = one.span(OTHERS)
+    moving = re.search(r"([\d.\u202f]+(?: to [\d.\u202f]+)?) \(with motion\)", spans)
+    if moving is None or answer(moving[1]) == "no":
+        return ""
+    since = re.search(r"met from l = ([\d.]+) on with motion", rules)
+    reach = f"; from {since[1]} frames a keyframe on they reach the claimed factor" if since else ""
+    return f" Other kinetic trees: {answer(moving[1])}, positions counted ({moving[1]} times as fast as today's best refit{reach})."
 
 
 def answer(span: str) -> str:
@@ -179,7 +197,7 @@ def on_disturbance(study: Study) -> str:
     share = len(doubtful) / len(rest)
     return (
         f"The machine was {'often ' if share > 0.1 else ''}disturbed: {len(doubtful)} of {of} are doubtful and have a question mark, for example "
-        f"{example['title']} on {words(example['scene'])} ({example['disturbed']})."
+        f"{example['title']} on {short(example['scene'])} ({example['disturbed']})."
     )
 
 
@@ -190,6 +208,7 @@ class Sentence:
     subject: str
     parts: list[str]
     place: str
+    more: Optional[tuple[str, str]] = None  #: id and title of a part with more, which the page links after the sentences
 
     @property
     def says(self) -> str:
@@ -203,26 +222,44 @@ def kept_cells(reference: Path = REFERENCE) -> Optional[cells_file.Cells]:
     return cells_file.read(file) if file.exists() else None
 
 
+def _beyond(found: Sequence[Situation]) -> tuple[float, list[str]]:
+    """Returns the size of the largest cell with pairs of two bodies, and the classes of sizes beyond it."""
+    largest = max((one.sizes[1] for one in found if one.asks == advice.PAIRS), default=math.nan)
+    return largest, [name for name, (low, _) in advice.SIZES.items() if low > largest]
+
+
+def larger(found: Sequence[Situation], reference: Path = REFERENCE) -> list[Situation]:
+    """Returns the situations that `on_larger` tells of."""
+    kept = kept_cells(reference)
+    every = [advice.situations(own_cells(kept, name)) for name in _beyond(found)[1]] if kept else []
+    return [one for situations in every for one in _ends(situations)]
+
+
+def own_cells(kept: cells_file.Cells, name: str, asks: str = advice.PAIRS) -> list[advice.Cell]:
+    """Returns the cells that come with the project of one class of SIZES."""
+    low, high = advice.SIZES[name]
+    return [cell for cell in kept.cells if cell.asks == asks and low <= cell.primitives < high]
+
+
+def _ends(situations: Sequence[Situation]) -> list[Situation]:
+    """Returns those with the fewest and the most frames a keyframe."""
+    return [situations[0], situations[-1]] if len(situations) > 1 else list(situations)
+
+
 def on_larger(found: Sequence[Situation], reference: Path = REFERENCE) -> list[str]:
     """Says up to which size a study measured pairs, and what the cells that come with the project have in the classes beyond it."""
-    pairs = [one for one in found if one.asks == advice.PAIRS]
-    largest = max((one.sizes[1] for one in pairs), default=math.nan)
-    classes = [name for name, (low, _) in advice.SIZES.items() if low > largest]
+    largest, classes = _beyond(found)
     if not classes:
         return []
     kept = kept_cells(reference)
     said, absent = [], []
     for name in classes:
-        low, high = advice.SIZES[name]
-        own = [cell for cell in kept.cells if cell.asks == advice.PAIRS and low <= cell.primitives < high] if kept else []
-        every = advice.situations(own)
-        ends = [every[0], every[-1]] if len(every) > 1 else every
-        told = [f"with {advice.brief(one)}" for one in ends]
+        told = [f"with {advice.brief(one)}" for one in _ends(advice.situations(own_cells(kept, name)))] if kept else []
         if told and kept:
-            said.append(f"By measurements that come with the project ({kept.short}), {name} primitives: {'. '.join(one[0].upper() + one[1:] for one in told)}.")
+            said.append(f"By measurements that come with the project ({kept.short}), {name} triangles: {'. '.join(one[0].upper() + one[1:] for one in told)}.")
         else:
             absent.append(name)
-    first = f"This study has at most {text.size(largest)} primitives (triangles)."
+    first = f"This study has at most {text.size(largest)} triangles, both bodies together."
     none = [f"{text.listing(absent)} {'were' if len(absent) > 1 else 'was'} not measured."] if absent else []
     return [" ".join([first, *said, *(one[0].upper() + one[1:] for one in none)])]
 
@@ -237,6 +274,7 @@ def parts_on_others(found: Sequence[Situation], reference: Path = REFERENCE) -> 
     others: dict[str, Situation] = {one.asks: one for one in found if one.asks != advice.PAIRS}  # the one with the most frames a keyframe
     named = [others[asks] for asks in dict.fromkeys([advice.SELF, advice.RAYS, *others]) if asks in others][:2]
     said = [advice.sentence(one) for one in named]
+    said += _on_positions_only(found, reference) if advice.SELF in others else []
     absent = [asks for asks in (advice.SELF, advice.RAYS) if asks not in others]
     if absent:
         kept = kept_cells(reference)
@@ -251,10 +289,29 @@ def parts_on_others(found: Sequence[Situation], reference: Path = REFERENCE) -> 
     return said
 
 
+def _on_positions_only(found: Sequence[Situation], reference: Path) -> list[str]:
+    """Says that pairs within a body were not measured with positions only, if so, and what is nearest: also of the cells that come with the project."""
+    own = [one for one in found if one.asks == advice.SELF]
+    only = next(iter(advice.FRAMES))
+    if any(one.frames == only for one in own):
+        return []
+    says = f"Pairs within a body with {advice.said_of(only)}, and above {text.size(max(one.sizes[1] for one in own))} triangles, were not measured in this study."
+    kept = kept_cells(reference)
+    known = [one for one in advice.situations([cell for cell in kept.cells if cell.asks == advice.SELF])] if kept else []
+    if kept and known:
+        nearest = next((one for one in known if one.frames == only), known[0])
+        titles = text.listing([cell.title for cell in kept.cells if (cell.asks, cell.frames) == (nearest.asks, nearest.frames)])
+        says += f" Nearest, by measurements that come with the project ({kept.short}; {titles}): {advice.brief(nearest)}."
+    first = own[-1].advice[0][1]
+    if first is not None and first.baseline:
+        says += f" {first.title[0].upper()}{first.title[1:]} uses no keyframes, so it can be taken with positions only, too; its time there is not known."
+    return [says]
+
+
 def on_errors(errors: Sequence[time_error_panels.Shown], reference: Path = REFERENCE) -> str:
-    """Says what exactness costs: by this study, else by the figures that come with the project."""
+    """Says what errors buy: by this study, else by the figures that come with the project."""
     if errors:
-        return errors[0].sentences[0]
+        return " ".join(errors[0].sentences)
     says = "No contestant of this study answers wrongly, so it does not say what exactness costs."
     file = reference / time_error_file.FILE
     kept = time_error_file.read(file) if file.exists() else []
@@ -264,12 +321,17 @@ def on_errors(errors: Sequence[time_error_panels.Shown], reference: Path = REFER
 def sentences(study: Study, found: Sequence[Situation], errors: Sequence[time_error_panels.Shown], known: Paper) -> list[Sentence]:
     """Returns the five lines of the top; four in a study of other questions than pairs of two bodies."""
     pairs = [one for one in found if one.asks == advice.PAIRS]
-    said = []
+    said: list[Sentence] = []
+    told: list[tuple[str, str]] = []
     if pairs:
-        ends = [pairs[0], pairs[-1]] if len(pairs) > 1 else pairs
-        said.append(Sentence("What to take", [*(advice.sentence(one) for one in ends), *on_larger(found)], "glance"))
-    said.append(Sentence("Self-collision, rays", parts_on_others(found), "glance"))
-    said.append(Sentence("Time against error", [on_errors(errors)], "errors" if errors else "limits"))
+        ends = _ends(pairs)
+        told = [one for situation in [*ends, *larger(found)] for one in advice.recommended(situation)]
+        parts = [*(advice.sentence(one) for one in ends), *on_larger(found), methods.explained(told)]
+        said.append(Sentence("What to take", [part for part in parts if part], "glance", ("kept", "The project's measurements, scene by scene")))
+    place = next((anchor for asks, anchor in advice.ANCHORS.items() if any(one.asks == asks for one in found)), "kept" if kept_cells() else "limits")
+    new = [one for situation in found if situation.asks in advice.ANCHORS for one in advice.recommended(situation) if one not in told]
+    said.append(Sentence("Self-collision, rays", [part for part in [*parts_on_others(found), methods.explained(new)] if part], place))
+    said.append(Sentence("Time against error", errors[0].sentences if errors else [on_errors(errors)], "errors" if errors else "limits"))
     said.append(Sentence("The paper", parts_on_the_paper(known), "claims"))
     said.append(Sentence("This run", [on_disturbance(study)], "limits"))
     return said
@@ -344,6 +406,11 @@ class Line:
     group: str  #: of the study
     by_knowledge: list[Optional[Fastest]]  #: in the order of FORESIGHT; None where less knowledge does as well
 
+    @property
+    def anchor(self) -> str:
+        """Returns the id of the first line that asks the same, if the sentences lead there; else ""."""
+        return advice.ANCHORS.get(self.asks, "")
+
 
 def lines(study: Study, every: Sequence[MeasuredCell]) -> list[Line]:
     """Returns a line for each cell, in the order of the tables: what is the fastest in it, by what is known, in ms and over the best refit."""
@@ -374,7 +441,7 @@ def lines(study: Study, every: Sequence[MeasuredCell]) -> list[Line]:
         scalar = "" if row["scalar"] == "float" else f", {row['scalar']}"
         found.append(
             Line(
-                words(str(row["scene"])) + scalar, "" if cell.asks == advice.PAIRS else cell.asks, text.size(row["primitives"]), f"{row['l']:g}",
+                short(str(row["scene"])) + scalar, "" if cell.asks == advice.PAIRS else cell.asks, text.size(row["primitives"]), f"{row['l']:g}",
                 str(row["group"]), by_knowledge,
             )  # fmt: skip
         )

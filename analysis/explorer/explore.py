@@ -8,6 +8,7 @@ The page's program is analysis/explorer, built by `analysis/explorer/build` (Nod
 from __future__ import annotations
 
 import argparse
+import hashlib
 import html
 import json
 import sys
@@ -26,7 +27,7 @@ TITLE = "BVH update strategies, measured"
 
 
 class NotBuilt(Exception):
-    """Says that the page's program has not been built."""
+    """Says that the page's program has not been built, or from other sources than those beside it."""
 
 
 def main(arguments: Optional[list[str]] = None) -> int:
@@ -53,13 +54,24 @@ def run(options: argparse.Namespace) -> int:
 
 
 def program() -> tuple[str, str]:
-    """Returns the page's script and style. Raises NotBuilt."""
+    """Returns the page's script and style. Raises NotBuilt without them, and for those of other sources: an older program shows other answers."""
+    builds = f"{PROGRAM.parent / 'build'} builds it, with Node.js and npm."
     try:
-        return tuple((PROGRAM / name).read_text(encoding="utf-8") for name in ("explorer.js", "explorer.css"))  # type: ignore[return-value]
+        script, style = ((PROGRAM / name).read_text(encoding="utf-8") for name in ("explorer.js", "explorer.css"))
     except OSError:
-        raise NotBuilt(
-            f"the explorer's program is not built: {PROGRAM.parent / 'build'} builds it, with Node.js and npm."
-        ) from None
+        raise NotBuilt(f"the explorer's program is not built: {builds}") from None
+    stamp = PROGRAM / "sources.sha256"
+    if (PROGRAM.parent / "src").is_dir() and (not stamp.exists() or stamp.read_text(encoding="utf-8").strip() != sources(PROGRAM.parent)):
+        raise NotBuilt(f"the explorer's program was built from other sources: {builds}")
+    return script, style
+
+
+def sources(folder: Path) -> str:
+    """Returns the hash of the sources that a program is built from, as `build` writes it next to the program."""
+    names = [name for name in ("package.json", "package-lock.json", "build") if (folder / name).is_file()]
+    names += [str(file.relative_to(folder)) for file in (folder / "src").rglob("*") if file.is_file()]
+    lines = [f"{hashlib.sha256((folder / name).read_bytes()).hexdigest()}  {name}\n" for name in sorted(names)]
+    return hashlib.sha256("".join(lines).encode()).hexdigest()
 
 
 def write(study: Study, folder: Path, title: str, claims: Optional[paper_claims.Claims] = None) -> Path:
@@ -78,7 +90,8 @@ def page(content: dict[str, Any], script: str, style: str) -> str:
     data = json.dumps(content, ensure_ascii=False, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     names = list(dict.fromkeys(plan["name"] for plan in content["plans"] if plan["name"]))
     script = script.replace("</script", "<\\/script")
-    title = html.escape(content["title"] or (", ".join(names) if len(names) < 4 else f"{len(names)} studies") or TITLE)
+    about = content["title"] or (f"{', '.join(names)} study" if len(names) == 1 else ", ".join(names) if len(names) < 4 else f"{len(names)} studies")
+    title = html.escape(f"kbvh explorer: {about or TITLE}")
     return f"""<!doctype html>
 <html lang="en">
 <head>

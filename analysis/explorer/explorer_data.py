@@ -14,7 +14,7 @@ from typing import Any, Optional
 
 import pandas as pd
 
-from advice import advice, cells_file, summary
+from advice import advice, cells_file, methods, summary
 from claims import claim_pictures, claims as paper_claims
 from figures import colours
 from ratios import profiles
@@ -116,7 +116,9 @@ def data(study: Study, title: str, claims: Optional[paper_claims.Claims], folder
         "cells": [_cell(row, dict((m, i) for i, (_, m) in enumerate(machines)), commits) for row in cell_rows],
         "runs": columns,
         "palette": colours.palette(),
+        "methods": methods.METHODS,
         "claims": _claims(known),
+        "paper": summary.parts_on_the_paper(known)[:-1] if known else [],
         "kept": kept(),
         "reference": known.reference if known else "",
         "report": "report.html" if (folder / "report.html").exists() else "",
@@ -141,6 +143,7 @@ def kept(file: Path = summary.REFERENCE / cells_file.FILE) -> Optional[dict[str,
             "primitives": number(float(parts[1]) * {"": 1, "k": 1e3, "M": 1e6}[parts[2]], 3), "l": number(float(parts[3])),
             "refit": cell.best_refit, "speeds": {id: number(speed, 4) for id, speed in cell.speeds.items()},
             "times": {id: number(time, 4) for id, time in cell.times.items()}, "doubtful": sorted(cell.doubtful),
+            "spans": {id: [number(span[0], 3), number(span[1], 3)] for id in cell.speeds if (span := cell.span(id))},
         })  # fmt: skip
     facts = {id: fact for cell in found.cells for id, fact in cell.facts.items()}
     return {

@@ -16,6 +16,7 @@ import pandas as pd
 from ratios import ratios
 from results import text
 from results.load import Study
+from results.scene_names import short as short_name
 
 #: The share of missed pairs below which an approximate contestant counts in the sentence on what exactness costs.
 FEW = 0.01
@@ -96,7 +97,7 @@ class Place:
     points: list[Point]  #: by time
     curves: list[Curve]
     fronts: dict[str, list[Point]]  #: points that no other dominates in time and error, by measure; the fastest first
-    sentences: list[str] = field(default_factory=list)  #: what exactness costs
+    sentences: list[str] = field(default_factory=list)  #: what errors buy
     measured: str = ""  #: when, by which commit and on which machine
     named: list[Point] = field(default_factory=list)  #: all points on the fronts of missed and of false pairs, by time
 
@@ -124,7 +125,7 @@ def places(study: Study) -> list[Place]:
         if not ((timed["guarantee"] == "approximate") & (timed["missed"] + timed["extra"] > 0)).any():
             continue
         first = timed.iloc[0]
-        title = f"{first['scene']}, {text.size(first['primitives'])} primitives, {first['scalar']}, l = {first['l']:g}"
+        title = f"{short_name(str(first['scene']))}, {text.size(first['primitives'])} triangles, {first['scalar']}, {first['l']:g} frames a keyframe"
         place = place_of(title, [_point(row) for _, row in timed.iterrows()], len(found))
         place.sentences = sentences(study, place)
         place.measured = _measured(timed)
@@ -197,36 +198,37 @@ def _curves(points: Sequence[Point]) -> list[Curve]:
 
 
 def sentences(study: Study, place: Place) -> list[str]:
-    """Returns what exactness costs among contestants that know nothing of the future, and among all where that differs."""
+    """Returns what errors buy among contestants that know nothing of the future, and among all where that differs."""
     told: dict[tuple[str, str], str] = {}
-    for known, words in (("none", "Without knowledge of the future"), ("", "With any knowledge of the future")):
+    for known, words in (("none", "If nothing of the future is known"), ("", "Whatever is known of the future")):
         usable = [one for one in place.points if one.foresight == known or not known]
         exact = next((one for one in usable if one.exact), None)
         few = next((one for one in usable if not one.exact and one.missed < FEW), None)
         if exact is None or (exact.contestant, few.contestant if few else "") in told:
             continue
-        says = f"{words}, on {place.title}: "
+        says = f"{words}, on one scene ({place.title}): "
+        allowing = f"allowing {FEW:.0%} missed pairs ".replace("%", "\u00a0%")
         if few is None:
             says += f"no approximate contestant missed less than {FEW:.0%}.".replace("%", "\u00a0%")
         else:
-            faster = few.time >= exact.time
-            slow, quick = (few, exact) if faster else (exact, few)
-            found = ratios.ratio(study, quick.run, slow.run, "with_motion")
-            apart = found is None or found.low > 1
-            doubts = [f"{text.factor(found.low)} to {text.factor(found.high)}"] if found and found.low < found.high else []
-            doubts += ["machine disturbed"] if found and found.disturbed else []
-            doubts += [] if apart else ["this run does not tell them apart"]
-            range_of = f" ({'; '.join(doubts)})" if doubts else ""
             wrong = f"missed {text.percent(few.missed)}" if few.missed else "missed nothing here, but promises nothing"
             wrong += f"; {text.percent(few.false)} of its pairs are false" if few.false else ""
-            says += (
-                f"exact is {text.factor(slow.time / quick.time)}{range_of} times as {'fast' if faster else 'slow'} as the fastest that misses less than "
-                f"{FEW:.0%}. ".replace("%", "\u00a0%")
-                + f"The fastest exact one, {exact.name}, takes {text.milliseconds(exact.time)}\u00a0ms a frame, the other, {few.name}, "
-                f"{text.milliseconds(few.time)}\u00a0ms; it {wrong}." + (" So an error buys no time here." if faster and apart else "")
-            )
+            one = f"{few.name} takes {text.milliseconds(few.time)}\u00a0ms a frame and {wrong}"
+            other = f"the fastest exact one, {exact.name}, takes {text.milliseconds(exact.time)}\u00a0ms a frame"
+            wins = few.time < exact.time
+            times = _times_as_fast(study, few, exact) if wins else _times_as_fast(study, exact, few)
+            says += f"{allowing}is {times}: {one}; {other}." if wins else f"{allowing}gains nothing: {other} and is {times} as the fastest with errors ({one})."
         told[exact.contestant, few.contestant if few else ""] = says
     return list(told.values())
+
+
+def _times_as_fast(study: Study, quick: Point, slow: Point) -> str:
+    """Writes how many times as fast the first is, with the interval and what makes the number doubtful."""
+    found = ratios.ratio(study, quick.run, slow.run, "with_motion")
+    doubts = [f"{text.factor(found.low)} to {text.factor(found.high)}"] if found and found.low < found.high else []
+    doubts += ["a doubtful run: the machine was disturbed"] if found and found.disturbed else []
+    doubts += [] if found is None or found.low > 1 else ["this run does not tell them apart"]
+    return f"{text.factor(slow.time / quick.time)} times as fast" + (f" ({'; '.join(doubts)})" if doubts else "")
 
 
 def finding(place: Place, name: str) -> str:

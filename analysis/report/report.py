@@ -16,7 +16,7 @@ import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
-from advice import advice, summary
+from advice import advice, kept_costs, summary
 from claims import claim_pictures, claims as paper_claims
 from claims.claim_points import ClaimError, Table
 from explorer import explore
@@ -120,6 +120,7 @@ def write(
         chart=summary.chart(situations),
         lines=summary.lines(study, cells),
         anchors=anchors,
+        kept_lines=kept_costs.kept_lines(),
         said_of=advice.said_of,
         kept=kept.told.replace("`", "") if (kept := summary.kept_cells()) else "",
         foresight=list(advice.FORESIGHT),
@@ -173,7 +174,7 @@ def _break_even(
     if which == "none" or not places:
         return None
     reading = (
-        "A bar begins at the l from which on a strategy is faster than a baseline, and ends at the largest measured l. An open arrow "
+        "A bar begins at the l from which on a strategy is faster than a baseline, and ends at the largest measured l. Sizes count the moving body only. An open arrow "
         "marks the largest measured l of a strategy that is slower at every measured l: its break-even point is unknown. Between measured l "
         "the ratio is interpolated on logarithmic axes, outside them nothing is. A name has only the setting that tells it from the others "
         "of its strategy."

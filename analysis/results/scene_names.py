@@ -30,6 +30,11 @@ def words(name: str) -> str:
     return name.replace("_", " ") if re.fullmatch(r"[a-z]+(_[a-z]+)+(-\d+)*", ANSWER.sub("", name)) else name
 
 
+def short(name: str) -> str:
+    """Writes a scene's name for readers without the size of one of its bodies, which stands next to the size of all: "dress 65k" is "dress"."""
+    return re.sub(r"(?<=\w) \d+(\.\d+)?[kM](?= |$)", "", words(name))
+
+
 def told_apart(runs: pd.DataFrame) -> tuple[pd.Series, list[str]]:
     """Returns the scene of each run, and a sentence for every name that several scenes share.
 

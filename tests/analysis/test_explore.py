@@ -152,14 +152,14 @@ class TestData(Folder):
             self.assertEqual(set(one["speeds"]), set(other["speeds"]))
             self.assertAlmostEqual(one["speeds"][one["refit"]], 1)
         sizes = {one["title"]: one["primitives"] for one in kept["cells"]}
-        self.assertEqual((sizes["dress 65k, 85k, l = 1"], sizes["diffcloth t-shirt, 4k, l = 1"]), (85_000, 4_000))
+        self.assertEqual((sizes["dress, 85k, l = 1"], sizes["diffcloth t-shirt, 4k, l = 1"]), (85_000, 4_000))
         self.assertIn("commit", kept["told"])
         self.assertLess(len(json.dumps(kept)), 60_000)
         self.assertIsNone(explorer_data.kept(self.folder / "none.json"))
 
     def test_a_cell_of_the_project_without_a_size_is_refused(self) -> None:
         file = self.folder / "cells.json"
-        file.write_text((explorer_data.summary.REFERENCE / "cells.json").read_text().replace("dress 65k, 85k, l = 1", "dress, l = 1", 1))
+        file.write_text((explorer_data.summary.REFERENCE / "cells.json").read_text().replace("dress, 85k, l = 1", "dress, l = 1", 1))
         with self.assertRaisesRegex(load.ResultError, "has no size"):
             explorer_data.kept(file)
 
@@ -233,7 +233,7 @@ class TestPage(Folder):
         data = {"plans": [{"name": "</script><b>", "description": ""}], "title": ""}
         page = explore.page(data, "var a = '</script>';", "")
         self.assertEqual(page.count("</script>"), 2)
-        self.assertIn("<title>&lt;/script&gt;&lt;b&gt;</title>", page)
+        self.assertIn("<title>kbvh explorer: &lt;/script&gt;&lt;b&gt; study</title>", page)
 
     def test_without_a_program_the_report_is_written_and_says_so(self) -> None:
         synthetic.write(self.folder, [line("bottom_up", [1.0], family="refit"), line("k", [2.0])])
@@ -248,6 +248,25 @@ class TestPage(Folder):
                 self.assertEqual(explore.main([str(self.folder)]), 2)
             self.assertIn("build builds it, with Node.js and npm", said.getvalue())
         self.assertFalse((self.folder / "explorer.html").exists())
+
+    def test_a_program_of_other_sources_is_refused(self) -> None:
+        room, program = self.folder / "explorer", self.folder / "explorer" / "dist"
+        (room / "src" / "views").mkdir(parents=True)
+        program.mkdir()
+        for name in ("src/main.js", "src/views/answer.js", "build", "package.json", "package-lock.json", "dist/explorer.js", "dist/explorer.css"):
+            (room / name).write_text(name)
+        with mock.patch.object(explore, "PROGRAM", program):
+            self.assertRaisesRegex(explore.NotBuilt, "built from other sources", explore.program)
+            # As `build` does it.
+            script = (Path(explore.__file__).parent / "build").read_text()
+            command = next(one for one in script.splitlines() if one.startswith("sources="))
+            stamp = subprocess.run(["bash", "-c", f'{command}; echo "$sources"'], cwd=room, capture_output=True, text=True, check=True).stdout
+            (program / "sources.sha256").write_text(stamp)
+            self.assertEqual(explore.program(), ("dist/explorer.js", "dist/explorer.css"))
+            (room / "src" / "views" / "answer.js").write_text("newer")
+            self.assertRaisesRegex(explore.NotBuilt, "built from other sources", explore.program)
+            shutil.rmtree(room / "src")  # as installed: without sources there is nothing to compare with
+            self.assertEqual(explore.program(), ("dist/explorer.js", "dist/explorer.css"))
 
     def test_damaged_results_are_refused(self) -> None:
         program = self.folder / "dist"

@@ -85,7 +85,10 @@ export function ranked(model, cells, known) {
     }
   for (const one of found) {
     one.bestIn = one.own.filter(({ refit, runs }) => runs.get(one.id) === refit).length;
-    one.disturbed = one.own.some(({ refit, runs }) => runs.get(one.id).disturbed || refit.disturbed);
+    one.doubtful = one.own
+      .filter(({ refit, runs }) => runs.get(one.id).disturbed || refit.disturbed)
+      .map(({ cell, speeds }) => ({ cell, speed: speeds.get(one.id) }));
+    one.disturbed = one.doubtful.length > 0;
   }
   return found;
 }
@@ -117,6 +120,7 @@ export function rankedKept(kept, cells, known) {
       ...{ id, contestant: { title, baseline }, low, high: Math.max(...speeds), own, cells: cells.length },
       speed: geometricMean([...speeds, ...Array(cells.length - own.length).fill(low)]),
       bestIn: own.filter((cell) => cell.refit === id).length,
+      doubtful: own.filter((cell) => cell.doubtful.includes(id)).map((cell) => ({ cell, speed: cell.speeds[id] })),
       disturbed: own.some((cell) => cell.doubtful.includes(id)),
     });
   }

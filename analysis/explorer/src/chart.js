@@ -1,6 +1,6 @@
 // Figures: a plot, its title and reading, points that lead to their runs by mouse and by keyboard, and its numbers.
 import * as Plot from "@observablehq/plot";
-import { make, paintOf, symbol } from "./dom.js";
+import { hintScrolling, make, paintOf, symbol } from "./dom.js";
 import { quantile } from "./statistics.js";
 import { tick } from "./words.js";
 
@@ -177,7 +177,7 @@ export function forget() {
 /**
  * Makes a figure.
  *   plot(width)   the options of Plot
- *   points        [{x, y, run, lines: [text], also?: [x]}]: what the pointer and the arrow keys visit, in data's units; `also` are
+ *   points        [{x, y, run, lines: [text], also?: [x], looks?: contestant}]: what the pointer and the arrow keys visit, in data's units; `also` are
  *                 other places on the same row that the pointer takes for the point
  *   table         {head: [text], rows: [[text]]}: the same numbers for readers of tables
  *   choose(run)   called when a point is chosen
@@ -206,7 +206,7 @@ export function figure({ title, reading, plot, points = [], table, choose, least
     host.querySelector("svg.chart").append(make("svg:circle", { class: "ring", cx: point.px, cy: point.py, r: 9 }));
     tip.replaceChildren(
       ...(point.run
-        ? [make("div", { class: "tip-name" }, symbol(point.run.contestant), point.lines[0])]
+        ? [make("div", { class: "tip-name" }, symbol(point.looks ?? point.run.contestant), point.lines[0])]
         : [make("div", { text: point.lines[0] })]),
       ...point.lines.slice(1).map((line) => make("div", { text: line })),
     );
@@ -310,10 +310,11 @@ export function figure({ title, reading, plot, points = [], table, choose, least
 
 /** Makes a figure's numbers, folded; the table is made when it is opened. */
 function numbers({ head, rows }) {
-  const details = make("details", { class: "numbers" }, make("summary", { text: "Numbers" }));
+  const details = make("details", { class: "numbers" }, make("summary", { text: `Numbers (${rows.length} ${rows.length === 1 ? "row" : "rows"})` }));
   details.addEventListener("toggle", () => {
     if (!details.open || details.children.length > 1) return;
     details.append(make("div", { class: "scroll", tabindex: 0 }, tableOf(head, rows)));
+    hintScrolling(details);
   });
   return details;
 }

@@ -23,7 +23,7 @@ export function details(model, state, run, close) {
   const facts = [
     [
       "Scene",
-      `${cell.name}, ${cell.size} primitives, ${cell.scalar}, l = ${cell.l}, ${cell.frames} ${cell.continuous ? "intervals" : "frames"}`,
+      `${cell.name}, ${cell.size} triangles (both bodies), ${cell.scalar}, l = ${cell.l}, ${cell.frames} ${cell.continuous ? "intervals" : "frames"}`,
     ],
     ["Guarantee", contestant.guarantee.replace("_", " ")],
     ["Settings", settings.map(([name, own]) => `${name.replaceAll("_", " ")} ${own}`).join(", ") || "none"],
@@ -37,8 +37,8 @@ export function details(model, state, run, close) {
         `${ratioText(compare(model, run, base, state.measure))} times as fast, against ${base.contestant.label}`,
       ],
     run.p50 !== null && [
-      "Frames",
-      `median ${milliseconds(run.p50)}, 99th percentile ${milliseconds(run.p99)}, worst ${milliseconds(run.worst)} ms (without motion)`,
+      "Frames, without motion",
+      `mean ${milliseconds(value(model, run, "without_motion"))} ms; half of them take more than ${milliseconds(run.p50)} ms, one in a hundred more than ${milliseconds(run.p99)} ms; the worst takes ${milliseconds(run.worst)} ms`,
     ],
     [
       "Answers",

@@ -37,7 +37,7 @@ export function symbol(contestant) {
 
 /** Returns the colour of a contestant, in the page's scheme. */
 export function paintOf(contestant) {
-  return `var(--contestant-${contestant.index})`;
+  return contestant.paint ?? `var(--contestant-${contestant.index})`;
 }
 
 /** Returns the declarations of all contestants' colours, in one scheme. */
@@ -79,10 +79,14 @@ export async function copy(text, button) {
   setTimeout(() => (button.textContent = said), 1500);
 }
 
-/** Fades the right edge of what can be scrolled there, so that nothing looks as if it ended. */
+/** Fades the right edge, or else the lower one, of what can be scrolled there, so that nothing looks as if it ended. */
 export function hintScrolling(root) {
   for (const one of root.querySelectorAll(".scroll, .plot-scroll")) {
-    const mark = () => one.classList.toggle("more", one.scrollLeft + one.clientWidth < one.scrollWidth - 2);
+    const mark = () => {
+      const right = one.scrollLeft + one.clientWidth < one.scrollWidth - 2;
+      one.classList.toggle("more", right);
+      one.classList.toggle("more-below", !right && one.scrollTop + one.clientHeight < one.scrollHeight - 2);
+    };
     one.addEventListener("scroll", mark, { passive: true });
     new ResizeObserver(mark).observe(one);
   }

@@ -1,11 +1,12 @@
 // The filters: one group a facet, with the numbers of runs that each value would leave.
 import { make, symbol } from "./dom.js";
 import { facetOf, selected } from "./model.js";
+import { sceneWords } from "./words.js";
 
 const NAMES = {
   plan: "Study",
   scene: "Scene",
-  size: "Size (primitives)",
+  size: "Triangles (both bodies)",
   l: "l (frames per keyframe)",
   scalar: "Scalar",
   machine: "Machine",
@@ -74,7 +75,9 @@ function group(model, state, set, facet) {
           ? Number(value).toLocaleString("en").replaceAll(",", "\u202f")
           : contestant
             ? contestant.title
-            : value,
+            : facet === "scene"
+              ? sceneWords(value)
+              : value,
       }),
       make("span", { class: "count", text: counts.get(value) }),
     );

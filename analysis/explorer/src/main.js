@@ -9,10 +9,10 @@ import { MEASURES, compare, entrants, model as modelOf, reference, seriesOfName,
 import { dataOf } from "./records.js";
 import { FACETS, decode, encode, initial } from "./state.js";
 import * as statistics from "./statistics.js";
-import { situations } from "./advice.js";
+import { FRAMES, classOf, situations } from "./advice.js";
 import { answer } from "./views/answer.js";
 import { claims } from "./views/claims.js";
-import { errors } from "./views/errors.js";
+import { errors, errs } from "./views/errors.js";
 import { frames } from "./views/frames.js";
 import { overview, profiled } from "./views/overview.js";
 import { pairwise } from "./views/pairwise.js";
@@ -71,13 +71,13 @@ function close() {
   host.back?.focus?.({ preventScroll: true });
 }
 
-/** The cell of views that show one: the chosen one, or the one with most entrants. */
+/** The cell of views that show one: the chosen one, or the one with most entrants; of time against error, with most that err. */
 function currentCell() {
   const cells = entrants(model, { ...state, contestants: state.view === "errors" ? "all" : state.contestants });
-  const wanted = [...cells.keys()].find((cell) => cell.key === state.cell);
-  if (wanted) return { cells, cell: wanted };
-  const most = [...cells].sort((a, b) => b[1].size - a[1].size || b[0].primitives - a[0].primitives)[0];
-  return { cells, cell: most?.[0] };
+  const erring = (cell) => (state.view === "errors" ? cell.runs.filter(errs).length : 0);
+  const order = [...cells].sort((a, b) => erring(b[0]) - erring(a[0]) || b[1].size - a[1].size || b[0].primitives - a[0].primitives);
+  const names = new Map(order.map(([cell]) => [cell, state.view === "errors" && !erring(cell) ? `${cell.title}: exact contestants only` : cell.title]));
+  return { cells: state.view === "errors" ? new Map(order) : cells, cell: order.find(([cell]) => cell.key === state.cell)?.[0] ?? order[0]?.[0], names };
 }
 
 function tools(uses, current) {
@@ -104,7 +104,7 @@ function tools(uses, current) {
       current &&
       choice(
         "Cell",
-        Object.fromEntries([...current.cells.keys()].map((cell) => [cell.key, cell.title])),
+        Object.fromEntries([...current.cells.keys()].map((cell) => [cell.key, current.names.get(cell)])),
         current.cell?.key,
         (cell) => set({ cell }),
       ),
@@ -180,6 +180,7 @@ function drawView() {
   }
   tools(view.uses, current);
   host.view.setAttribute("aria-label", view.name);
+  const mixed = ["overview", "pairwise"].includes(name) && new Set(model.cells.map((cell) => `${cell.asks}, ${classOf(FRAMES, cell.l)}`)).size > 1;
   const context = { model, state, set, choose, legend, legendList, legendOf, othersButton, cell: current?.cell };
   const count = selected(model, state).length;
   const nothing = count === 0 && !["answer", "claims"].includes(name);
@@ -188,11 +189,25 @@ function drawView() {
   host.view.replaceChildren(
     ...(nothing
       ? [make("p", { class: "lead", text: "No run passes these filters." })]
-      : besideLegend(view.draw(context).filter(Boolean))),
+      : [mixed && mixture(), ...besideLegend(view.draw(context).filter(Boolean))].filter(Boolean)),
   );
   hintScrolling(host.view);
+  hintScrolling(host.tabs.parentElement.parentElement);
+  const tab = host.tabs.querySelector('[aria-selected="true"]');
+  if (tab) host.tabs.scrollLeft = tab.offsetLeft - 40; // the tabs are a row that scrolls in a narrow window
   host.said.textContent = `${view.name}: ${plural(count, "run")}`;
   forget();
+}
+
+/** Says that a view is about all situations, and leads to the one of the reader. */
+function mixture() {
+  return make(
+    "p",
+    { class: "lead mixture" },
+    "All situations of these results are mixed here: sizes, frames a keyframe, pairs of two bodies and within one, and what is known of the future. For one of them, ",
+    make("button", { type: "button", class: "quiet", text: "see the answer", click: () => set({ view: "answer" }) }),
+    " or filter.",
+  );
 }
 
 function drawPanel() {
@@ -243,6 +258,9 @@ function markChosen() {
     cell.classList.toggle("chosen", model.runs[cell.dataset.run].key === state.point);
 }
 
+/** Returns a description without the marks of code, which plans have. */
+const plain = (text) => text.replaceAll("`", "");
+
 function header() {
   const { data } = model;
   const named = data.plans.filter((plan) => plan.name);
@@ -251,12 +269,13 @@ function header() {
   const study = names.length > 3 ? plural(names.length, "study").replace("studys", "studies") : names.join(" · ");
   const about =
     named.length === 1
-      ? [make("p", { class: "question", text: named[0].description })]
+      ? [make("p", { class: "question", text: plain(named[0].description) })]
       : named.map((plan) =>
-          make("p", { class: "question" }, make("strong", { text: `${plan.name}.` }), ` ${plan.description}`),
+          make("p", { class: "question" }, make("strong", { text: `${plan.name}.` }), ` ${plain(plan.description)}`),
         );
+  const usual = model.runs.filter((run) => run.contestant.usual).length;
   const facts = [
-    plural(model.runs.length, "run"),
+    plural(model.runs.length, "run") + (usual < model.runs.length ? ` (${usual} of them guaranteed and on one thread)` : ""),
     plural(model.cells.length, "cell"),
     plural(new Set(model.cells.map((cell) => cell.scene)).size, "scene"),
     plural(new Set(model.contestants.map((one) => one.id)).size, "strategy").replace("strategys", "strategies"),
@@ -341,7 +360,7 @@ async function read(files) {
   host.said.textContent = `Reading ${names}`;
   try {
     const texts = await Promise.all([...files].map((file) => file.text()));
-    model = modelOf({ ...dataOf(texts.join("\n"), names, given.palette), kept: given.kept });
+    model = modelOf({ ...dataOf(texts.join("\n"), names, given.palette), kept: given.kept, methods: given.methods });
   } catch (problem) {
     host.problem.textContent = `${names} cannot be shown: ${problem.message}`;
     host.problem.hidden = false;
@@ -379,6 +398,7 @@ function build() {
         role: "tab",
         "data-view": key,
         "aria-controls": "view",
+        "data-name": name,
         text: name,
         click: () => set({ view: key }),
       }),
@@ -395,19 +415,20 @@ function build() {
       },
     }),
     header(),
+    make("nav", { class: "views" }, host.open, host.tabs),
     host.problem,
     make(
       "div",
       { class: "layout" },
       host.filters,
-      make("main", {}, make("nav", { class: "views" }, host.open, host.tabs), host.tools, host.view),
+      make("main", {}, host.tools, host.view),
       host.panel,
     ),
     make(
       "footer",
       {},
       make("p", {
-        text: `From ${model.data.source}. Times are of whole clips, by medians of frames; intervals are bootstraps over whole rounds, and ranges where there are fewer than five.`,
+        text: `From ${model.data.source}. Sizes are triangles of both bodies together. Times are ms per frame of whole clips: the mean over frames of each frame's median over the rounds. Intervals are bootstraps over whole rounds; with fewer than five rounds, they are ranges.`,
       }),
     ),
     host.said,

@@ -1,6 +1,6 @@
 // The results as objects, and the choices of the page applied to them.
-import { SCOPES, ratio, timeOf } from "./statistics.js";
-import { factor, milliseconds, bytes, count } from "./words.js";
+import { SCOPES, ratio, span, timeOf } from "./statistics.js";
+import { factor, milliseconds, bytes, count, sceneWords } from "./words.js";
 
 /** What can be measured: times with repetitions, times of single frames, and numbers without a clock. */
 export const MEASURES = {
@@ -32,6 +32,7 @@ export function model(data) {
   const contestants = data.contestants.map((one, index) => ({ ...one, index, key: tag(one) }));
   const cells = data.cells.map((one, index) => {
     const cell = { ...one, index, machine: machines[one.machine], commit: commits[one.commit], runs: [] };
+    cell.shown = sceneWords(cell.scene);
     cell.key = [cell.name, cell.hash.slice(0, 6), cell.scalar, cell.l];
     if (machines.length > 1) cell.key.push(`m${cell.machine.index + 1}`);
     if (commits.length > 1) cell.key.push(cell.commit.label);
@@ -43,7 +44,7 @@ export function model(data) {
   const names = Object.keys(columns).filter((name) => !["cell", "contestant"].includes(name));
   const place = Object.fromEntries(data.phases.map((phase, i) => [phase, i]));
   const runs = columns.cell.map((cell, index) => {
-    const run = { index, cell: cells[cell], contestant: contestants[columns.contestant[index]], medians: {}, sums: {} };
+    const run = { index, cell: cells[cell], contestant: contestants[columns.contestant[index]], medians: {} };
     for (const name of names) run[name] = columns[name][index];
     if (typeof run.draws === "function") makeOnce(run, "draws", run.draws);
     run.plan = data.plans[run.plan];
@@ -89,7 +90,7 @@ function tag({ tag: label, builder }) {
 }
 
 function title(cell, several) {
-  const parts = [cell.scene, cell.size];
+  const parts = [cell.shown, cell.size];
   if (several.scalars) parts.push(cell.scalar);
   parts.push(`l = ${cell.l}`);
   if (several.commits) parts.push(cell.commit.label);
@@ -97,11 +98,14 @@ function title(cell, several) {
   return parts.join(", ");
 }
 
-/** Returns the times per frame of each repetition of a run, in ms. */
-export function times(model, run, scope) {
-  return (run.sums[scope] ??= run.times.map((phases) =>
-    SCOPES[scope].reduce((sum, phase) => sum + phases[model.place[phase]], 0),
-  ));
+/**
+ * Returns the ends of a run's `value`: {low, high, isInterval}, by the same estimator, so that they enclose it; both are the value itself
+ * for measures without repetitions.
+ */
+export function endsOf(model, run, measure) {
+  if (measure in SCOPES && run.times.length) return span(run, model.place, measure);
+  const own = value(model, run, measure);
+  return { low: own, high: own, isInterval: false };
 }
 
 /** Returns a run's value of a measure: by medians over repetitions where there are any; null if unknown. */

@@ -53,6 +53,12 @@ export function plural(number, noun) {
   return `${number} ${noun}${number === 1 ? "" : "s"}`;
 }
 
+/** Writes the name of a scene for readers, without the size of one of its bodies: short of analysis/results/scene_names.py. */
+export function sceneWords(name) {
+  const words = /^[a-z]+(_[a-z]+)+(-\d+)*(?= \(|$)/.test(name) ? name.replaceAll("_", " ") : name;
+  return words.replace(/(?<=\w) \d+(\.\d+)?[kM](?= |$)/, "");
+}
+
 /** Formats a tick of a logarithmic axis. */
 export function tick(value) {
   if (value >= 1e6) return `${significant(value / 1e6, 3).replace(/\.0+$/, "")}M`;

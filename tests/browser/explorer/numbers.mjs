@@ -68,6 +68,33 @@ for (const which of ["reference", "merged"]) {
   leave(page);
 }
 
+await check("every bar over l or n encloses its point", async () => {
+  for (const which of ["reference", "merged"])
+    for (const view of ["answer&know=clip", "scaling"]) {
+      const page = await open(which, `#view=${view}`);
+      const outside = await page.$$eval("#view svg.chart", (charts) =>
+        charts.flatMap((chart) => {
+          const groups = [...chart.children].filter((one) => ["rule", "dot"].includes(one.getAttribute("aria-label")));
+          let bars = [];
+          const found = [];
+          for (const group of groups)
+            if (group.getAttribute("aria-label") === "rule") bars = [...group.querySelectorAll("line")].map((line) => ["x1", "y1", "y2"].map((name) => Number(line.getAttribute(name))));
+            else
+              for (const dot of group.children) {
+                const [x, y] = dot.getAttribute("transform").match(/[\d.]+/g).map(Number);
+                const bar = bars.find(([at]) => Math.abs(at - x) < 1);
+                found.push(bar ? Math.max(Math.min(bar[1], bar[2]) - y, y - Math.max(bar[1], bar[2])) : Infinity);
+              }
+          return found;
+        }),
+      );
+      assert.ok(outside.length > 3, `${which}, ${view}: ${outside.length} points`);
+      const most = Math.max(...outside);
+      assert.ok(most < 0.1, `${which}, ${view}: a point is ${most} pixels outside of its bar`);
+      leave(page);
+    }
+});
+
 // --- two commits side by side -------------------------------------------------------------------------------
 
 await check("merged: two commits, pair by pair", async () => {

@@ -61,7 +61,7 @@ await check("states survive their links, strange names included", async () => {
 
 await check("the page asks its question, and the text of a study stays text", async () => {
   const page = await open("merged", "#view=overview");
-  assert.equal(await page.title(), "is it faster?");
+  assert.equal(await page.title(), "kbvh explorer: is it faster? study");
   assert.equal(await page.$eval("h1", (one) => one.textContent), "Which BVH update to take?");
   assert.match(await page.$eval(".notes summary", (one) => one.textContent), /^How this study was made · is it faster\? · \d+ runs/);
   assert.match(await page.$eval(".question", (one) => one.textContent), /<script>alert\(1\)<\/script>/);
@@ -282,13 +282,87 @@ await check("legends are next to the plot, or right above it in a narrow window"
   }
 });
 
-await check("in a narrow window the answer comes before the menus", async () => {
-  const page = await open("reference", "", { width: 390 });
-  const tops = await page.evaluate(() =>
-    [".take", ".views", "#open-filters"].map((one) => document.querySelector(one).getBoundingClientRect().top),
+await check("in a narrow window the tabs are one row on top, and the answer comes before the questions", async () => {
+  for (const view of ["answer", "overview", "claims"]) {
+    const page = await open("reference", `#view=${view}`, { width: 390 });
+    const [tabs, main, chosen] = await page.evaluate(() =>
+      ["[role=tablist]", "main", "[role=tab][aria-selected=true]"].map((one) => document.querySelector(one).getBoundingClientRect().toJSON()),
+    );
+    assert.ok(tabs.bottom <= main.top && tabs.height < 60, `${view}: ${tabs.height} pixels`);
+    assert.ok(chosen.left >= 0 && chosen.right <= 390, `${view}: the tab is in sight`);
+    if (view === "answer") {
+      const tops = await page.evaluate(() => [".take", ".questions"].map((one) => document.querySelector(one).getBoundingClientRect().top));
+      assert.ok(tops[0] > 0 && tops[0] < 844, "in the first screen");
+      assert.ok(tops[0] < tops[1]);
+    }
+    leave(page);
+  }
+});
+
+await check("the answer leads to the paper's claims, whose first sentence is that of the report", async () => {
+  const page = await open("reference");
+  const links = await page.$$(".onward button");
+  assert.ok(links.length >= 1);
+  await links[0].click();
+  assert.equal(await page.evaluate(() => window.explorer.state().view), "claims");
+  const said = await page.$eval(".main-claim", (one) => one.textContent);
+  assert.match(said, /^Is updating a kinetic AABB tree faster than a bottom-up refit\? .*tuned here.*built as in 2006/);
+  leave(page);
+});
+
+await check("time against error opens where contestants err, with missed pairs first and what they buy on top", async () => {
+  const page = await load("merged");
+  const [wanted, chosen, others, titles, said, share] = await page.evaluate(() => {
+    const { model, set } = window.explorer;
+    const wrong = model.contestants.find((one) => one.id === "top_down");
+    wrong.guarantee = "approximate";
+    const cell = model.cells.at(-1);
+    const run = cell.runs.find((one) => one.contestant === wrong);
+    Object.assign(run, { pairs: 1000, missed: 4, extra: 332 });
+    set({ view: "errors" });
+    const all = (selector) => [...document.querySelectorAll(selector)];
+    const select = all(".toolbar select").find((one) => one.value === cell.key);
+    for (const one of all("#view .numbers")) one.open = true;
+    return [cell.key, select?.value, [...(select?.options ?? [])].slice(1).map((one) => one.text), all("#view figure h3").map((one) => one.textContent), all(".bargain").map((one) => one.textContent), run.contestant.label];
+  });
+  assert.equal(chosen, wanted);
+  assert.ok(others.length > 1 && others.every((text) => text.endsWith(": exact contestants only")), others.join(" | "));
+  assert.deepEqual(titles.slice(0, 2), ["Missed pairs", "False pairs"]);
+  assert.match(said[0], /^(If nothing|Whatever is known) .*allowing 1\u202f% missed pairs (is [\d.]+ times as fast|gains nothing: .* and is [\d.]+ times as fast)/);
+  assert.ok(said[0].includes("missed 0.40\u202f%"), said[0]);
+  // 332 of the 1000 - 4 + 332 reported pairs are false: the share is of what was reported, as in the report.
+  await page.waitForFunction(() => document.querySelectorAll("#view .numbers table").length > 1);
+  const row = await page.evaluate(
+    (label) => [...document.querySelectorAll("#view .numbers")][1].querySelector("table").innerText.split("\n").find((line) => line.startsWith(label)),
+    share,
   );
-  assert.ok(tops[0] > 0 && tops[0] < 844, "in the first screen");
-  assert.ok(tops[0] < tops[1]);
+  assert.match(row, /\s25\u202f%$/);
+  await page.close();
+});
+
+await check("the details of a point have all times of frames without motion", async () => {
+  const page = await open("merged", "#view=runs");
+  await page.click(".runs tbody button.name");
+  const said = await page.$$eval("#details dl div", (list) => list.map((one) => one.textContent).find((text) => text.startsWith("Frames")));
+  assert.match(said ?? "no times of frames", /^Frames, without motionmean [\d.]+ ms; half of them take more than [\d.]+ ms, one in a hundred more than [\d.]+ ms; the worst takes [\d.]+ ms$/);
+  leave(page);
+});
+
+await check("views of all situations say so, and lead to the answer", async () => {
+  for (const view of ["overview", "pairwise"]) {
+    const page = await open("reference", `#view=${view}`);
+    await page.click(".mixture button");
+    assert.equal(await page.evaluate(() => window.explorer.state().view), "answer");
+    leave(page);
+  }
+});
+
+await check("the tabs stay where they are", async () => {
+  const page = await open("reference");
+  const at = () => page.$eval('[data-view="claims"]', (one) => one.getBoundingClientRect().toJSON());
+  const before = await at();
+  await page.evaluate(() => window.explorer.set({ view: "overview" }));
+  assert.deepEqual(await at(), before);
   leave(page);
 });
 

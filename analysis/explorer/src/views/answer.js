@@ -2,9 +2,10 @@
 import { ASKS, FRAMES, KNOWN, PAIRS, SIZES, classOf, countedCells, matches, nearest, ranked } from "../advice.js";
 import { tableOf } from "../chart.js";
 import { choice, make, symbol } from "../dom.js";
-import { SIX, compare, ratioText, value } from "../model.js";
+import { SIX, compare, decided, ratioText, value } from "../model.js";
 import { span } from "../statistics.js";
-import { factor, milliseconds, plural } from "../words.js";
+import { factor, milliseconds, plural, sceneWords, sentence } from "../words.js";
+import { errs } from "./errors.js";
 import { sweepFigure, sweeps } from "./scaling.js";
 import { keptCosts, unmeasured } from "./unmeasured.js";
 
@@ -37,7 +38,7 @@ export function answer(context) {
   const found = asked(model, state);
   if (!found.every.length && !model.data.kept)
     return [make("p", { class: "lead", text: "These results have no scene with a refit and another strategy: nothing can be compared." })];
-  const ask = (card) => make("div", { class: "ask" }, questions(context, found), card);
+  const ask = (card) => make("div", { class: "ask" }, questions(context, found), make("div", {}, card, onward(context)));
   if (found.cells.length) {
     const order = ranked(model, found.cells, state.know);
     return [ask(said(context, found, order)), curve(context, found, order), cost(context, found, order[0])].filter(Boolean);
@@ -53,7 +54,7 @@ export function answer(context) {
 }
 
 /** A question with a few answers: buttons, of which one is pressed; those that were not measured are dashed, and a line says so. */
-function buttons(question, options, chosen, change, absent, reason) {
+function buttons(question, options, chosen, change, absent, reason, note) {
   return make(
     "fieldset",
     { class: "question-of" },
@@ -71,6 +72,7 @@ function buttons(question, options, chosen, change, absent, reason) {
         }),
       ),
     ),
+    note && make("p", { class: "note", text: note }),
     reason && make("p", { class: "note reason", text: reason }),
   );
 }
@@ -93,10 +95,10 @@ function reasonOf(options, absent, isKept, more = "") {
 
 function questions({ model, state, set }, found) {
   const kinds = Object.fromEntries(found.kinds.map((kind) => [kind, ASKS[kind] ?? kind]));
-  const scenes = { "": "any scene", ...Object.fromEntries(found.scenes.map((scene) => [scene, scene])) };
+  const scenes = { "": "any scene", ...Object.fromEntries(found.scenes.map((scene) => [scene, sceneWords(scene)])) };
   const known = found.scene ? [] : found.known;
-  const question = (text, options, chosen, name, absent, isKept, more) =>
-    buttons(text, options, chosen, (key) => set({ [name]: key }), absent, reasonOf(options, absent, isKept, more));
+  const question = (text, options, chosen, name, absent, isKept, more, note) =>
+    buttons(text, options, chosen, (key) => set({ [name]: key }), absent, reasonOf(options, absent, isKept, more), note);
   const largest = found.own.map(({ cell }) => cell).reduce((most, cell) => (most && most.primitives >= cell.primitives ? most : cell), null);
   return make(
     "section",
@@ -109,15 +111,17 @@ function questions({ model, state, set }, found) {
       "frames",
       (key) => !found.matching.some(({ cell }) => matches(cell, "", key)),
       (key) => known.some((cell) => matches(cell, found.size, key)),
+      "",
+      state.frames in FRAMES ? "" : "Follows from question 1 until you choose.",
     ),
     question(
-      "3. How many triangles?",
+      "3. How many triangles, both bodies together?",
       names(SIZES),
       found.size,
       "large",
       (key) => key !== "any" && !found.own.some(({ cell }) => matches(cell, key)),
       (key) => known.some((cell) => matches(cell, key)),
-      largest && `The largest scene here has ${largest.size}.`,
+      largest && `The largest scene here has ${largest.size} triangles, both bodies together.`,
     ),
     question(
       "4. What collides?",
@@ -134,7 +138,7 @@ function questions({ model, state, set }, found) {
 /** Tells the speed of a strategy, as analysis/advice/advice.py does. */
 export function speedText(one) {
   const missing = one.own.length < one.cells ? `, measured in ${one.own.length}` : "";
-  const disturbed = one.disturbed ? " (the machine was disturbed)" : "";
+  const disturbed = one.disturbed ? ` (${doubtText(one)})` : "";
   if (one.contestant.baseline && !one.bestIn) {
     const span = one.low < one.high ? `${factor(one.low)} to ${factor(one.high)}` : factor(one.low);
     return `a refit, ${span} times as fast as the best one of the ${one.cells === 1 ? "cell" : "cells"}${missing}${disturbed}`;
@@ -147,7 +151,26 @@ export function speedText(one) {
   const span = one.low < one.high ? `${factor(one.low)} to ${factor(one.high)}` : "";
   const kind = one.isInterval ? "95\u00a0% interval" : "range of its rounds";
   const of = span && one.cells === 1 ? `${kind} ${span}` : `${span} in ${plural(one.cells, "cell")}`.trim();
-  return `${factor(one.speed)} times as fast as the best refit (${of}${missing}${one.disturbed ? "; the machine was disturbed" : ""})`;
+  return `${factor(one.speed)} times as fast as the best refit (${of}${missing}${one.disturbed ? `; ${doubtText(one)}` : ""})`;
+}
+
+/** Names the ratios that were measured on a disturbed machine, each next to its number. */
+function doubtText({ doubtful, cells }) {
+  if (cells === 1) return "a doubtful run: the machine was disturbed";
+  const named = doubtful.slice(0, 2).map(({ cell, speed }) => `${factor(speed)} on ${cell.shown ?? cell.title}`);
+  const more = doubtful.length > 2 ? ` and ${doubtful.length - 2} more` : "";
+  return `doubtful, from a disturbed machine: ${named.join(", ")}${more}`;
+}
+
+/** Answers in words whether a strategy is surely faster than the best refit: by the cells in which it loses, or may lose. "" of a refit. */
+export function sureText(model, one) {
+  if (one.contestant.baseline) return "";
+  const all = one.cells === 1 ? "the only cell" : `all ${one.own.length} cells`;
+  const lost = one.own.filter(({ speeds }) => speeds.get(one.id) < 1);
+  if (lost.length) return `Surely faster? No: ${lost.length} of ${plural(one.own.length, "cell")} ${lost.length === 1 ? "is" : "are"} slower.`;
+  const open = one.own.filter(({ runs, refit }) => decided(compare(model, runs.get(one.id), refit, "with_motion")) !== 1);
+  if (!open.length) return `Surely faster? Yes, in ${all}, each interval or range included.`;
+  return `Surely faster? Not beyond doubt: ${one.own.length === open.length ? "no" : `in ${open.length} of ${plural(one.own.length, "cell")} no`} interval or range of an undisturbed run lies above 1.`;
 }
 
 /** Tells on how many cells a strategy beats the best refit, which refit that is, and where it loses; "" of one cell or of a best refit. */
@@ -156,7 +179,7 @@ export function winsText(one) {
   const refits = Map.groupBy(one.own, ({ refit }) => refit.contestant.title);
   const [title, most] = [...refits].sort((a, b) => b[1].length - a[1].length)[0];
   const lost = one.own.filter(({ speeds }) => speeds.get(one.id) < 1);
-  const scenes = [...new Set(lost.map(({ cell }) => cell.scene))];
+  const scenes = [...new Set(lost.map(({ cell }) => cell.shown))];
   const where = scenes.length && `; slower on ${scenes.slice(0, 3).join(", ")}${scenes.length > 3 ? ` and ${scenes.length - 3} more` : ""}`;
   const of = refits.size === 1 ? title : `${title} in ${most.length} of them`;
   return `It beats the best refit (${of}) in ${one.own.length - lost.length} of ${plural(one.own.length, "cell")}${where || ""}.`;
@@ -183,6 +206,22 @@ export function rangeText(times) {
   return `${text(low)}${low === high ? "" : ` to ${text(high)}`} a frame`;
 }
 
+/** Says in a clause what a strategy does; "" if the page does not know. */
+export function methodText(model, { id, contestant }) {
+  const clause = model.data.methods?.[id];
+  return clause ? `${sentence(contestant.title)} ${clause}.` : "";
+}
+
+/** Leads to the two other questions that the page answers. */
+function onward({ model, set }) {
+  const link = (view, text) => make("button", { type: "button", class: "quiet", text, click: () => set({ view }) });
+  const parts = [
+    model.data.claims.length > 0 && link("claims", "Does the paper hold?"),
+    model.runs.some(errs) && link("errors", "What if errors are allowed?"),
+  ].filter(Boolean);
+  return parts.length > 0 && make("p", { class: "note onward" }, parts.map((part, i) => [i > 0 && " · ", part]));
+}
+
 function said({ model, state, set }, found, order) {
   const best = order[0];
   if (!best) return make("section", { class: "answer" }, make("p", { text: "No strategy was measured in half of these cells." }));
@@ -194,17 +233,18 @@ function said({ model, state, set }, found, order) {
   const { cell } = found.cells[0];
   const of =
     best.cells === 1
-      ? cell.title.replace(`${cell.scene}, ${cell.size}`, () => `${cell.scene} with ${cell.size} primitives`)
-      : `${plural(best.cells, "cell")} of ${scenes.size === 1 ? cell.scene : plural(scenes.size, "scene")}`;
+      ? cell.title.replace(`${cell.shown}, ${cell.size}`, () => `${cell.shown} with ${cell.size} triangles`)
+      : `${plural(best.cells, "cell")} of ${scenes.size === 1 ? cell.shown : plural(scenes.size, "scene")}`;
   return make(
     "section",
     { class: "answer", "aria-live": "polite" },
     make("p", { class: "take" }, "Take ", symbol(best.contestant), make("strong", { text: best.contestant.title }), `: ${costText(model, best)}.`),
-    make("p", { class: "speed", text: [`That is ${speedText(best)}.`, winsText(best)].filter(Boolean).join(" ") }),
+    make("p", { class: "speed", text: [`That is ${speedText(best)}.`, winsText(best), sureText(model, best)].filter(Boolean).join(" ") }),
+    methodText(model, best) && make("p", { class: "method", text: methodText(model, best) }),
     make(
       "p",
       {},
-      `Measured on one thread in ${of}, positions included; ${PROMISES[best.contestant.guarantee]}. It is called `,
+      `Measured on one thread in ${of}, evaluation of positions included, sizes in triangles of both bodies together; ${PROMISES[best.contestant.guarantee]}. It is called `,
       make("code", { text: best.id }),
       " on the command line and in code.",
     ),
@@ -268,7 +308,7 @@ function cost({ model, choose }, found, best) {
     "section",
     {},
     make("h2", { text: "What it costs, scene by scene" }),
-    make("p", { class: "note", text: "Each line is a cell: one scene at one size, with l frames from a keyframe to the next." }),
+    make("p", { class: "note", text: "Each line is a cell: one scene at one size (triangles of both bodies together), with l frames from a keyframe to the next." }),
     make("div", { class: "scroll", tabindex: 0 }, tableOf(["scene", `${best.contestant.title}, ms`, "best refit", "ms", "times as fast"], rows)),
   );
 }

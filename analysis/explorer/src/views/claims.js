@@ -5,8 +5,9 @@ import { plural } from "../words.js";
 const HERE = "this study";
 
 export function claims({ model }) {
-  const { claims: decided, report, reference } = model.data;
+  const { claims: decided, report, reference, paper } = model.data;
   return [
+    ...(paper ?? []).map((text) => make("p", { class: "main-claim", text })),
     make(
       "p",
       { class: "lead tally" },
@@ -24,7 +25,7 @@ export function claims({ model }) {
     ),
     make("p", {
       class: "note",
-      text: `${plural(decided.length, "claim")} of Zachmann and Weller (2006), experiments (E), then theory (T), judged by thresholds in analysis/claims.json: by these results where they decide, else by the reference run that comes with the project${reference ? ` (${reference})` : ""}.`,
+      text: `${plural(decided.length, "claim")} of Zachmann and Weller (2006), experiments (E), then theory (T), judged by thresholds in analysis/claims.json: by these results where they decide, else by the reference run that comes with the project${reference ? ` (${reference})` : ""}. Sizes here count the moving body only, as in the paper.`,
     }),
     ...decided.map((one) => {
       const picture = make("div", { class: "drawn" });

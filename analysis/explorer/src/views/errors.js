@@ -2,16 +2,43 @@
 import * as Plot from "@observablehq/plot";
 import { clippedMarks, dotLook, figure, logAxis, logScale } from "../chart.js";
 import { make, paintOf } from "../dom.js";
-import { MEASURES, selected, value } from "../model.js";
-import { percent, plural, sentence, significant, tick } from "../words.js";
+import { MEASURES, compare, selected, value } from "../model.js";
+import { factor, milliseconds, percent, plural, sentence, significant, tick } from "../words.js";
 import { empty } from "./overview.js";
 
+/** The share of missed pairs below which an approximate contestant counts in the sentence on top, as in analysis/figures/time_error.py. */
+const FEW = 0.01;
+
+const missedShare = (run) => (run.missed === null ? null : run.missed / Math.max(run.pairs ?? 1, 1));
+
+/** The share of the reported pairs that are false; null where it is not known. */
+function falseShare(run) {
+  if (run.extra === null || run.pairs === null) return null;
+  const reported = run.pairs - (run.missed ?? 0) + run.extra;
+  return reported > 0 ? run.extra / reported : 0;
+}
+
+/** Whether a contestant without a guarantee answered wrongly: what time against error is about. */
+export const errs = (run) => run.contestant.guarantee === "approximate" && (run.missed ?? 0) + (run.extra ?? 0) > 0;
+
 const ERRORS = {
-  looseness: {
-    name: "looseness of the boxes",
-    of: (run) => run.looseness,
+  missed: {
+    name: "missed pairs",
+    of: missedShare,
     format: (v) => percent(v),
-    reading: "Summed surface area of the boxes over that of tight ones, minus one: loose boxes cost query time.",
+    reading: "Pairs of the oracle that were not reported, as a share of all.",
+  },
+  extra: {
+    name: "false pairs",
+    of: falseShare,
+    format: (v) => percent(v),
+    reading: "Reported pairs that the oracle does not have, as a share of the reported ones.",
+  },
+  protrusion: {
+    name: "protrusion",
+    of: (run) => run.protrusion,
+    format: (v) => significant(v, 2),
+    reading: "How far a vertex leaves a box that a query has read, in units of the scene: a valid box has exactly 0.",
   },
   false: {
     name: "false candidates per pair",
@@ -22,25 +49,31 @@ const ERRORS = {
     format: (v) => significant(v, 3),
     reading: "Candidates that are no pairs, for each pair.",
   },
-  missed: {
-    name: "missed pairs",
-    of: (run) => (run.missed === null ? null : run.missed / Math.max(run.pairs ?? 1, 1)),
+  looseness: {
+    name: "looseness of the boxes",
+    of: (run) => run.looseness,
     format: (v) => percent(v),
-    reading: "Pairs of the oracle that were not reported, as a share of all.",
-  },
-  extra: {
-    name: "extra pairs",
-    of: (run) => (run.extra === null ? null : run.extra / Math.max(run.pairs ?? 1, 1)),
-    format: (v) => percent(v),
-    reading: "Reported pairs that the oracle does not have, as a share of all.",
-  },
-  protrusion: {
-    name: "protrusion",
-    of: (run) => run.protrusion,
-    format: (v) => significant(v, 2),
-    reading: "How far a vertex leaves a box that a query has read, in units of the scene: a valid box has exactly 0.",
+    reading: "Summed surface area of the boxes over that of tight ones, minus one: loose boxes cost query time.",
   },
 };
+
+/** Colours and markers of the approximate strategies, in the order of their ids: those of analysis/figures/time_error_panels.py. */
+const COLOURS = ["#D55E00", "#009E73", "#AA4499", "#E69F00", "#56B4E9", "#8C7A00", "#CC79A7", "#A8324A", "#5D4A9C", "#117733"];
+const MARKERS = ["o", "s", "^", "D", "v", "p", "<", "h", ">", "d"];
+
+/** Returns, for each approximate strategy, a contestant that looks unlike the others: their family has one colour. */
+function apart(model) {
+  const approximate = model.contestants.filter((one) => one.guarantee === "approximate");
+  const ids = [...new Set(approximate.map((one) => one.id))].sort();
+  return new Map(
+    ids.map((id, i) => {
+      const first = approximate.find((one) => one.id === id);
+      const corners = model.data.palette.corners[MARKERS[i % MARKERS.length]] ?? [];
+      const paint = `color-mix(in srgb, ${COLOURS[i % COLOURS.length]} 80%, var(--ink))`;
+      return [id, { ...first, paint, look: { ...first.look, corners, filled: true } }];
+    }),
+  );
+}
 
 export function errors(context) {
   const { model, state } = context;
@@ -49,27 +82,29 @@ export function errors(context) {
   const runs = selected(model, { ...state, contestants: "all" }).filter(
     (run) => run.cell === cell && value(model, run, state.measure) > 0,
   );
+  const looks = apart(model);
   const figures = Object.values(ERRORS)
-    .map((error) => one(context, error, runs))
+    .map((error) => one(context, error, runs, looks))
     .filter(Boolean);
   if (!figures.length)
     return [
       empty(
         `Time against error: ${cell.title}`,
-        "All contestants of this cell have the same errors; the numbers of a point tell them.",
+        "All contestants of this cell have the same errors; the numbers of a point tell them. Cells whose contestants err come first in the menu.",
       ),
     ];
   return [
+    ...["none", ""].map((known) => bargain(model, runs, known)).map((text, i, all) => text && text !== all[i - 1] && make("p", { class: "bargain", text })),
     make("p", {
       class: "lead",
       text: `Every contestant and setting of one cell, those without a guarantee included: ${cell.title}. Down and to the left is better; the line joins those that no other beats in both.`,
     }),
     make("div", { class: "pair" }, figures),
-    context.legend([...new Set(runs.map((run) => run.contestant.id))]),
+    context.legendList([...new Map(runs.map(({ contestant: one }) => [one.id, [looks.get(one.id) ?? one, one.title]])).values()]),
   ];
 }
 
-function one({ model, state, choose }, error, runs) {
+function one({ model, state, choose }, error, runs, looks) {
   const usable = runs
     .map((run) => ({ run, time: value(model, run, state.measure), error: error.of(run) }))
     .filter((p) => p.error !== null && p.error >= 0);
@@ -83,7 +118,8 @@ function one({ model, state, choose }, error, runs) {
   const beside = Math.sqrt(zero * axis.domain[0]);
   const points = usable.map((p) => {
     const [y, side] = times.clip(p.time);
-    return { ...p, x: p.error === 0 ? zero : p.error, y, side, paint: paintOf(p.run.contestant) };
+    const look = looks.get(p.run.contestant.id) ?? p.run.contestant;
+    return { ...p, look, x: p.error === 0 ? zero : p.error, y, side, paint: paintOf(look) };
   });
   const front = pareto(points);
   const measure = MEASURES[state.measure];
@@ -105,7 +141,7 @@ function one({ model, state, choose }, error, runs) {
       marks: [
         Plot.ruleX([beside], { stroke: "var(--line)", strokeDasharray: "2 3" }),
         Plot.line(front, { x: "x", y: "y", stroke: "var(--soft)", strokeWidth: 1, curve: "step-after" }),
-        ...points.map((p) => Plot.dot([p], { x: "x", y: "y", ...dotLook(p.run.contestant, 4.5) })),
+        ...points.map((p) => Plot.dot([p], { x: "x", y: "y", ...dotLook(p.look, 4.5) })),
         clippedMarks(points, "y"),
       ],
     }),
@@ -113,6 +149,7 @@ function one({ model, state, choose }, error, runs) {
       x: p.x,
       y: p.y,
       run: p.run,
+      looks: p.look,
       current: p.run.key === state.point,
       lines: [
         p.run.contestant.label,
@@ -123,12 +160,39 @@ function one({ model, state, choose }, error, runs) {
     })),
     choose,
     table: {
-      head: ["contestant", measure.name, error.name],
+      head: ["contestant", `${measure.name}${measure.unit === "ms" ? ", ms" : ""}`, error.name],
       rows: usable
         .toSorted((a, b) => a.time - b.time)
         .map((p) => [p.run.contestant.label, measure.format(p.time), error.format(p.error)]),
     },
   });
+}
+
+/**
+ * Says what errors buy in a cell: how many times as fast as the fastest exact contestant the fastest is that misses less than FEW of the
+ * pairs; of those that know nothing of the future ("none"), or of all (""). "" if nothing misses pairs.
+ */
+function bargain(model, runs, known) {
+  const fastest = (list) => list.reduce((best, run) => (best && value(model, best, "with_motion") <= value(model, run, "with_motion") ? best : run), null);
+  const timed = runs.filter((run) => run.contestant.family !== "oracle" && run.times.length && (!known || run.contestant.foresight === known));
+  const exact = fastest(timed.filter((run) => run.contestant.guarantee !== "approximate"));
+  const few = fastest(timed.filter((run) => run.contestant.guarantee === "approximate" && run.pairs > 0 && missedShare(run) < FEW));
+  if (!exact || !few || !runs.some(errs)) return "";
+  const ms = (run) => `${milliseconds(value(model, run, "with_motion"))}\u00a0ms a frame`;
+  const wins = value(model, few, "with_motion") < value(model, exact, "with_motion");
+  const ratio = wins ? compare(model, few, exact, "with_motion") : compare(model, exact, few, "with_motion");
+  const ends = [
+    ratio.low < ratio.high && `${factor(ratio.low)} to ${factor(ratio.high)}`,
+    ratio.low <= 1 && "this run does not tell them apart",
+    ratio.disturbed && "a doubtful run: the machine was disturbed",
+  ].filter(Boolean);
+  const times = `${factor(ratio.middle)} times as fast${ends.length ? ` (${ends.join("; ")})` : ""}`;
+  const one = `${few.contestant.label} takes ${ms(few)} and missed ${few.missed ? percent(missedShare(few)) : "nothing here, but promises nothing"}`;
+  const other = `the fastest exact one, ${exact.contestant.title}, takes ${ms(exact)}`;
+  return (
+    `${known ? "If nothing of the future is known" : "Whatever is known of the future"}, allowing ${percent(FEW, 1)} missed pairs ` +
+    (wins ? `is ${times}: ${one}; ${other}.` : `gains nothing: ${other} and is ${times} as the fastest with errors (${one}).`)
+  );
 }
 
 /** Returns the points that no other beats in both coordinates, from left to right. */

@@ -243,8 +243,8 @@ function matrix({ model, state, set, choose }, cells) {
       make(
         "th",
         { scope: "row", title: cell.title },
-        make("span", { class: "scene", text: cell.scene }),
-        make("span", { class: "rest", text: cell.title.slice(cell.scene.length + 2) }),
+        make("span", { class: "scene", text: cell.shown }),
+        make("span", { class: "rest", text: cell.title.slice(cell.shown.length + 2) }),
       ),
       names.map((name) => {
         const one = found.get(name);

@@ -10,6 +10,12 @@ export function runs({ model, state, set, choose }) {
   const columns = [
     { name: "strategy", of: (run) => run.contestant.label, text: (v) => v },
     { name: "scene", of: (run) => run.cell.title, text: (v) => v },
+    {
+      name: `times as fast as ${referenceName(model, state)}`,
+      number: true,
+      of: (run) => ratioOf(model, state, run)?.middle ?? null,
+      text: (_, run) => ratioText(ratioOf(model, state, run)),
+    },
     ...["motion", "update", "query"].map((phase) => ({
       name: `${phase}, ms`,
       number: true,
@@ -19,14 +25,9 @@ export function runs({ model, state, set, choose }) {
     {
       name: `${measure.name}${measure.unit === "ms" ? ", ms" : ""}`,
       number: true,
+      measured: true,
       of: (run) => value(model, run, state.measure),
       text: measure.format,
-    },
-    {
-      name: `against ${referenceName(model, state)}`,
-      number: true,
-      of: (run) => ratioOf(model, state, run)?.middle ?? null,
-      text: (_, run) => ratioText(ratioOf(model, state, run)),
     },
     { name: "worst frame, ms", number: true, of: (run) => run.worst, text: milliseconds },
     { name: "missed", number: true, of: (run) => run.missed, text: count },
@@ -48,7 +49,7 @@ export function runs({ model, state, set, choose }) {
       { class: run.key === state.point ? "chosen" : null },
       columns.map(({ of, text, number }, i) => {
         const words = text(of(run), run);
-        if (i) return make("td", { class: number ? "n" : null, text: run.refused && i === 5 ? "no time" : words });
+        if (i) return make("td", { class: number ? "n" : null, text: run.refused && columns[i].measured ? "no time" : words });
         return make(
           "th",
           { scope: "row" },

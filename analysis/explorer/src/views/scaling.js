@@ -2,7 +2,7 @@
 import * as Plot from "@observablehq/plot";
 import { clippedMarks, dotLook, figure, lineLook, logAxis, logScale } from "../chart.js";
 import { make, paintOf } from "../dom.js";
-import { MEASURES, SIX, entrants, seriesOfName, times, value } from "../model.js";
+import { MEASURES, SIX, endsOf, entrants, seriesOfName, value } from "../model.js";
 import { SCOPES } from "../statistics.js";
 import { plural, tick } from "../words.js";
 import { empty, profiled } from "./overview.js";
@@ -32,7 +32,7 @@ export function scaling(context) {
       make(
         "section",
         {},
-        make("h2", { text: "Over n, the primitives" }),
+        make("h2", { text: "Over n, the triangles of both bodies" }),
         make("p", {
           class: "lead",
           text: "Both axes are logarithmic: work proportional to n is as steep as the thin grey lines.",
@@ -87,8 +87,8 @@ export function sweepFigure({ model, state, choose }, sweep, field, strong) {
   const measure = MEASURES[state.measure];
   const { first } = sweep;
   const place = [
-    first.scene,
-    field === "l" ? `${first.size} primitives` : `l = ${first.l}`,
+    first.shown,
+    field === "l" ? `${first.size} triangles` : `${plural(first.l, "frame")} a keyframe`,
     model.several.scalars && first.scalar,
     model.several.commits && first.commit.label,
     model.several.machines && first.machine.label,
@@ -105,7 +105,7 @@ export function sweepFigure({ model, state, choose }, sweep, field, strong) {
     const series = seriesOfName(model, state, name);
     const own = line.map(({ at: x, run }) => {
       const time = value(model, run, state.measure);
-      const range = state.measure in SCOPES ? times(model, run, state.measure) : [time];
+      const ends = strong.has(name) ? endsOf(model, run, state.measure) : { low: time, high: time }; // pale lines have no bars
       const [y, side] = axis.clip(time);
       points.push({
         x,
@@ -114,15 +114,16 @@ export function sweepFigure({ model, state, choose }, sweep, field, strong) {
         current: run.key === state.point,
         lines: [
           run.contestant.label,
-          `${field === "l" ? `l = ${x}` : `${run.cell.size} primitives`}: ${measure.format(time)}${measure.unit === "ms" ? " ms" : ""}`,
+          `${field === "l" ? plural(x, "frame") + " a keyframe" : `${run.cell.size} triangles`}: ${measure.format(time)}${measure.unit === "ms" ? " ms" : ""}`,
+          ...(ends.low < ends.high ? [`${ends.isInterval ? "95\u00a0% interval" : "range of its rounds"} ${measure.format(ends.low)} to ${measure.format(ends.high)}`] : []),
         ],
       });
       return {
         x,
         y,
         side,
-        low: axis.clip(Math.min(...range))[0],
-        high: axis.clip(Math.max(...range))[0],
+        low: axis.clip(ends.low)[0],
+        high: axis.clip(ends.high)[0],
         paint: paintOf(series.contestant),
       };
     });
@@ -133,7 +134,7 @@ export function sweepFigure({ model, state, choose }, sweep, field, strong) {
         return hit ? measure.format(value(model, hit.run, state.measure)) : "–";
       }),
     ]);
-    return { series, own, pale: !strong.has(name) };
+    return { series, own, pale: !strong.has(name), best: name === [...strong][0] };
   });
   const guides =
     field === "l"
@@ -148,7 +149,10 @@ export function sweepFigure({ model, state, choose }, sweep, field, strong) {
   const ends = { domain: [at[0] / 1.15, at.at(-1) * 1.15] };
   return figure({
     title: place,
-    notes: axis.outside ? [`${plural(axis.outside, "point")} beyond the axis: arrows at its edge.`] : [],
+    notes: [
+      state.measure in SCOPES ? "Upright bars: 95\u00a0% intervals of the times; with fewer than five rounds, their range." : "",
+      axis.outside ? `${plural(axis.outside, "point")} beyond the axis: arrows at its edge.` : "",
+    ].filter(Boolean),
     plot: (width) => ({
       height: 330,
       marginLeft: 56,
@@ -159,7 +163,8 @@ export function sweepFigure({ model, state, choose }, sweep, field, strong) {
         domain: ends.domain,
         ticks: spaced(at, width - 90),
         tickFormat: tick,
-        label: field === "l" ? "l →" : "primitives →",
+        label: field === "l" ? "frames a keyframe (l) →" : "triangles of both bodies →",
+        labelAnchor: "center",
       },
       y: logScale(axis, 240, `↑ ${measure.name}${measure.unit === "ms" ? ", ms per frame" : ""}`, { grid: true }),
       marks: [
@@ -173,7 +178,7 @@ export function sweepFigure({ model, state, choose }, sweep, field, strong) {
           .map(({ series, own }) =>
             Plot.line(own, { x: "x", y: "y", ...lineLook(series.contestant, 1), strokeOpacity: 0.35 }),
           ),
-        ...lines.filter((line) => !line.pale).flatMap(({ series, own }) => [
+        ...lines.filter((line) => !line.pale).flatMap(({ series, own, best }) => [
           Plot.ruleX(own, {
             x: "x",
             y1: "low",
@@ -182,10 +187,10 @@ export function sweepFigure({ model, state, choose }, sweep, field, strong) {
             strokeOpacity: 0.5,
             strokeWidth: 2.4,
           }),
-          Plot.line(own, { x: "x", y: "y", ...lineLook(series.contestant, 1.5) }),
+          Plot.line(own, { x: "x", y: "y", ...lineLook(series.contestant, best ? 3 : 1.5) }),
           Plot.dot(
             own.filter((p) => !p.side),
-            { x: "x", y: "y", ...dotLook(series.contestant, 4) },
+            { x: "x", y: "y", ...dotLook(series.contestant, best ? 5.5 : 4) },
           ),
         ]),
         clippedMarks(
@@ -196,7 +201,7 @@ export function sweepFigure({ model, state, choose }, sweep, field, strong) {
     }),
     points,
     choose,
-    table: { head: ["strategy", ...at.map((x) => (field === "l" ? `l = ${x}` : tick(x)))], rows },
+    table: { head: [`strategy${measure.unit === "ms" ? ", ms" : ""}`, ...at.map((x) => (field === "l" ? `l = ${x}` : tick(x)))], rows },
   });
 }
 

@@ -2,8 +2,8 @@
 import { ASKS, FRAMES, KNOWN, SIZES, nearest, rankedKept } from "../advice.js";
 import { tableOf } from "../chart.js";
 import { make } from "../dom.js";
-import { factor, milliseconds, plural, sentence } from "../words.js";
-import { costText, rangeText, speedText } from "./answer.js";
+import { factor, milliseconds, plural, sceneWords, sentence } from "../words.js";
+import { costText, methodText, rangeText, speedText } from "./answer.js";
 
 /** Names classes of l and of sizes. */
 function situation(frames, size) {
@@ -21,14 +21,16 @@ export function unmeasured({ model, state, set }, found, best) {
   const other = known && !(best && known.frames === found.near.frames && known.size === found.near.size) ? known : null;
   const lead = ({ frames, size }) =>
     make("button", { type: "button", class: "quiet", text: situation(frames, size), click: () => set({ frames, large: size }) });
-  const scene = found.scene ? `${found.scene}, ` : "";
+  const refits = found.frames === "1" && best?.contestant.baseline && found.near.frames !== "1";
+  const scene = found.scene ? `${sceneWords(found.scene)}, ` : "";
   return make(
     "section",
     { class: "answer", "aria-live": "polite" },
     make("p", { class: "absent-here" }, make("strong", { text: "Not measured in these results: " }), `${ASKS[found.asks] ?? found.asks}, ${scene}${situation(found.frames, found.size)}.${above}`),
     own && [
       make("p", { class: "take" }, "Take ", make("strong", { text: own.contestant.title }), `: ${rangeText(own.own.map((cell) => [cell.times[own.id], cell]))}.`),
-      make("p", { class: "speed", text: `That is ${speedText(own)}.` }),
+      make("p", { class: "speed", text: [`That is ${speedText(own)}.`, keptWins(own)].filter(Boolean).join(" ") }),
+      methodText(model, own) && make("p", { class: "method", text: methodText(model, own) }),
       make("p", {}, "By the project's own measurements, not by these results. It is called ", make("code", { text: own.id }), " on the command line and in code."),
       make("p", { class: "note", text: `Measured: ${kept.told}.` }),
     ],
@@ -38,11 +40,21 @@ export function unmeasured({ model, state, set }, found, best) {
         { class: own ? "note nearest" : "nearest" },
         "Nearest in these results: ",
         lead(found.near),
-        `. There, where ${KNOWN[state.know].words}, take ${best.contestant.title}: ${costText(model, best)}${best.cells === 1 ? ` on ${best.own[0].cell.title}` : ""}; ${speedText(best)}.`,
+        `. There, where ${KNOWN[state.know].words}, take ${best.contestant.title}: ${costText(model, best)}${best.cells === 1 ? ` on ${best.own[0].cell.title}` : ""}; ${speedText(best)}.${refits ? " A refit uses no keyframes: it can be taken with positions only, too; its time there is not known." : ""}`,
       ),
     other && make("p", { class: "kept-near" }, "The project's own measurements have it with ", lead(other), "."),
     !own && !best && !other && make("p", { text: "Nothing near it was measured, either." }),
   );
+}
+
+/** Tells in how many of the project's cells a strategy beats the best refit, where it is slowest, and whether that is sure; "" of a refit. */
+function keptWins(one) {
+  if (one.contestant.baseline) return "";
+  const lost = one.own.filter((cell) => cell.speeds[one.id] < 1);
+  const slowest = one.own.reduce((most, cell) => (cell.speeds[one.id] < most.speeds[one.id] ? cell : most));
+  const sure = one.own.every((cell) => cell.spans[one.id]?.[0] > 1 && !cell.doubtful.includes(one.id));
+  const verdict = lost.length ? "no" : sure ? "yes, in each of them with its whole interval" : "not beyond doubt";
+  return `Faster in ${one.own.length - lost.length} of ${plural(one.own.length, "cell")}, slowest on ${slowest.title} (${factor(slowest.speeds[one.id])}). Surely faster? ${sentence(verdict)}.`;
 }
 
 /** What the project's choice costs in each cell that comes with the project. */
@@ -52,18 +64,23 @@ export function keptCosts({ model, state }, found) {
   const best = rankedKept(kept, found.kept, state.know)[0];
   if (!best) return null;
   const ms = (cell, id) => (id in cell.times ? milliseconds(cell.times[id]) : "–");
+  const ratioOf = (cell, id) => {
+    if (!(id in cell.speeds)) return "–";
+    const [low, high] = cell.spans[id] ?? [];
+    return `${factor(cell.speeds[id])}${cell.doubtful.includes(id) ? "?" : ""}${low < high ? ` (${factor(low)}–${factor(high)})` : ""}`;
+  };
   const rows = found.kept.map((cell) => [
     cell.title,
     ms(cell, best.id),
     kept.strategies[cell.refit]?.[0] ?? cell.refit,
     ms(cell, cell.refit),
-    best.id === cell.refit ? "the best refit" : best.id in cell.speeds ? factor(cell.speeds[best.id]) : "–",
+    best.id === cell.refit ? "the best refit" : ratioOf(cell, best.id),
   ]);
   return make(
     "section",
     {},
     make("h2", { text: "What it costs in the project's own measurements" }),
-    make("p", { class: "note", text: sentence(`${plural(rows.length, "cell")}: a cell is one scene at one size, with l frames from a keyframe to the next.`) }),
+    make("p", { class: "note", text: sentence(`${plural(rows.length, "cell")}: a cell is one scene at one size, with l frames from a keyframe to the next; sizes are triangles of both bodies together. In parentheses: the 95\u00a0% interval. ?: measured while the machine was disturbed.`) }),
     make("div", { class: "scroll", tabindex: 0 }, tableOf(["scene", `${best.contestant.title}, ms`, "best refit", "ms", "times as fast"], rows)),
   );
 }

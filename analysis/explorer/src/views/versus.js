@@ -166,7 +166,7 @@ function strategies({ model, state, choose }, title, of, both) {
       current: p.b.key === state.point,
       lines: [
         p.b.contestant.label,
-        `${p.b.cell.scene}, ${p.b.cell.size}, l = ${p.b.cell.l}`,
+        `${p.b.cell.shown}, ${p.b.cell.size}, l = ${p.b.cell.l}`,
         `B is ${ratioText(p.ratio)} times as fast`,
       ],
     })),
@@ -206,7 +206,7 @@ function changes({ model, state, choose }, both) {
     high: axis.clip(one.ratio.high)[0],
     paint: paintOf(one.b.contestant),
   }));
-  const text = (one) => `${one.b.contestant.id}: ${one.b.cell.scene}, ${one.b.cell.size}, l = ${one.b.cell.l}`;
+  const text = (one) => `${one.b.contestant.id}: ${one.b.cell.shown}, ${one.b.cell.size}, l = ${one.b.cell.l}`;
   return figure({
     title: `The ${sure.length === 1 ? "change" : `${sure.length} largest changes`} whose intervals exclude 1`,
     reading: "The line is the 95 % interval of the ratio (bootstrap over the rounds of both) or, with fewer than five repetitions, the range. Disturbed ratios are left out.",
