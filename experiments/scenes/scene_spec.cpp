@@ -74,10 +74,17 @@ io::TakeAs take_as_of(JsonReader& keys) {
   keys.fail("as", "expected given, triangles or points, got '" + word + "'");
 }
 
-bool smooth_of(JsonReader& keys) {
-  const std::string word = keys.word("curves").value_or("lines");
-  if (word == "lines" || word == "smooth") return word == "smooth";
-  keys.fail("curves", "expected lines or smooth, got '" + word + "'");
+Paths paths_of(JsonReader& keys) {
+  const std::string word = keys.word("curves").value_or("given");
+  if (word == "given") return Paths::given;
+  if (word == "lines") return Paths::lines;
+  if (word == "smooth") return Paths::smooth;
+  keys.fail("curves", "expected given, lines or smooth, got '" + word + "'");
+}
+
+void take_paths(io::AnimatedMesh& mesh, Paths paths) {
+  if (paths == Paths::lines) mesh.bends.clear();
+  if (paths == Paths::smooth) scenes::smooth(mesh);
 }
 
 BodySpec read_body(const json& value, const std::string& place, const fs::path& folder) {
@@ -95,7 +102,7 @@ BodySpec read_body(const json& value, const std::string& place, const fs::path& 
     std::copy(move->begin(), move->end(), body.placement.translate);
   body.as = take_as_of(keys);
   body.self = keys.truth("self").value_or(false);
-  body.smooth = smooth_of(keys);
+  body.paths = paths_of(keys);
   if (keys.has("file") == keys.has("shape"))
     throw io::InputError(place + ": a body has either a file or a shape");
   if (keys.has("shape")) {
@@ -268,7 +275,7 @@ std::vector<SceneSpec> read_scenes(const json& scene, const std::string& place, 
       base.bodies.push_back(read_body(bodies[i], place + ": bodies[" + std::to_string(i) + "]", folder));
     if (!base.optional)
       for (const BodySpec& body : base.bodies) check_is_a_file(body);
-    for (const char* key : {"triangles", "keyframes", "obstacle"})
+    for (const char* key : {"triangles", "keyframes", "obstacle", "curves"})
       if (keys.has(key)) keys.fail(key, "is for built-in scenes; bodies have their own numbers");
   } else {
     try {
@@ -288,6 +295,7 @@ std::vector<SceneSpec> read_scenes(const json& scene, const std::string& place, 
   base.options.keyframes =
       std::uint32_t(keys.whole("keyframes", ranges::keyframes).value_or(base.options.keyframes));
   base.options.obstacle_triangles = std::uint32_t(keys.whole("obstacle", ranges::triangles).value_or(0));
+  base.paths = paths_of(keys);
   if (base.options.obstacle_triangles > 0 && find_builtin_scene(base.builtin).bodies == BodiesOf::one)
     keys.fail("obstacle", "the scene '" + base.builtin + "' has one body");
   keys.finish();
@@ -357,6 +365,7 @@ LoadedScene load(const SceneSpec& spec, const MakeProgress& progress) {
     const BuiltinScene& builtin = find_builtin_scene(spec.builtin);
     loaded.origin = SceneOrigin::built_in;
     loaded.meshes = builtin.make(spec.options, progress);
+    for (io::AnimatedMesh& mesh : loaded.meshes) take_paths(mesh, spec.paths);
     if (builtin.bodies == BodiesOf::one) loaded.self.assign(loaded.meshes.size(), true);
     if (builtin.reversal != nullptr) loaded.reversal = builtin.reversal(spec.options);
     if (builtin.drag != nullptr) loaded.drag = builtin.drag(spec.options, loaded.meshes);
@@ -411,7 +420,7 @@ LoadedScene load(const SceneSpec& spec, const MakeProgress& progress) {
                                                                              : "") +
           counted(mesh.primitive_count(), mesh.kind == io::MeshKind::points ? "point" : "control net") +
           "; pairs with them are overlaps of boxes, not intersections");
-    if (body.smooth) scenes::smooth(mesh);
+    take_paths(mesh, body.paths);
     place(mesh, body.placement);
     loaded.sources.push_back(source);
     names.push_back(mesh.name);

@@ -14,6 +14,13 @@
 
 namespace kbvh::experiments {
 
+/// How vertices move between keyframes.
+enum class Paths : std::uint8_t {
+  given,   ///< as in the file or from the generator
+  lines,   ///< on straight lines
+  smooth,  ///< on cubics through the keyframes (curves.hpp)
+};
+
 /// One body of a scene from files, or by formula.
 struct BodySpec {
   std::string name;                    ///< empty: from the file or the shape
@@ -23,8 +30,8 @@ struct BodySpec {
   nlohmann::json shape;  ///< for make_shape; null for files
   io::TakeAs as = io::TakeAs::given;
   Placement placement;
-  bool self = false;         ///< pairs within it are requested, too
-  bool smooth = false;       ///< vertices move on cubics through the keyframes (curves.hpp), not on lines
+  bool self = false;  ///< pairs within it are requested, too
+  Paths paths = Paths::given;
   std::optional<bool> weld;  ///< of files (io/weld.hpp); by default where no script changes single vertices
   std::string place;         ///< for messages
 };
@@ -41,6 +48,7 @@ struct SceneSpec {
   std::string name;     ///< empty: derived from its content
   std::string builtin;  ///< or empty: the bodies
   BuiltinOptions options;
+  Paths paths = Paths::given;  ///< of a built-in scene
   std::vector<BodySpec> bodies;
   std::optional<ScriptSpec> script;  ///< user-defined plan changes
   VertexOrder order = VertexOrder::given;

@@ -147,8 +147,28 @@ TEST(CurvedBodies, BodiesAskForSmoothCurves) {
     scene("waving_sheet:triangles=8,curves=round");
     FAIL();
   } catch (const io::InputError& error) {
-    EXPECT_NE(std::string(error.what()).find("expected lines or smooth, got 'round'"), std::string::npos);
+    EXPECT_NE(std::string(error.what()).find("expected given, lines or smooth, got 'round'"),
+              std::string::npos);
   }
+}
+
+TEST(CurvedBodies, BuiltInScenesAreGivenStraightenedOrSmoothed) {
+  const auto plans = [](const std::string& builtin, const std::string& curves) {
+    nlohmann::json scene{{"builtin", builtin}, {"triangles", 8}, {"keyframes", 4}};
+    if (!curves.empty()) scene["curves"] = curves;
+    return assemble<double>(load(read_scenes(scene, "scene", {})[0])).bodies[0].plans;
+  };
+  const auto given = plans("thrown_shards", ""), lines = plans("thrown_shards", "lines");
+  EXPECT_TRUE(given.curved());
+  EXPECT_TRUE(plans("thrown_shards", "given").curved());
+  EXPECT_FALSE(lines.curved());
+  for (const double t : {0.0, 2.0 / 3, 2.0}) EXPECT_EQ(positions_at(given, t), positions_at(lines, t)) << t;
+  EXPECT_NE(positions_at(given, 0.25), positions_at(lines, 0.25));
+  EXPECT_FALSE(plans("waving_sheet", "").curved());
+  EXPECT_TRUE(plans("waving_sheet", "smooth").curved());
+  EXPECT_THROW(plans("waving_sheet", "round"), io::InputError);
+  EXPECT_THROW(read_scenes({{"bodies", {"sphere:triangles=20"}}, {"curves", "lines"}}, "scene", {}),
+               io::InputError);
 }
 
 }  // namespace
