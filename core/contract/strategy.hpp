@@ -403,7 +403,8 @@ class Strategy {
   }
   void remove_incident_pairs(PairBuffer& pairs, std::size_t from) const {
     if (!may_find_incident_) return;
-    remove_incident(scene_, pairs, from, [](const PrimitivePair& pair) -> const PrimitivePair& { return pair; });
+    remove_incident(scene_, pairs, from,
+                    [](const PrimitivePair& pair) -> const PrimitivePair& { return pair; });
   }
   void check_not_before(double t) const {
     const double earliest = between_frames_ ? earliest_ : time_;
@@ -430,7 +431,7 @@ class Strategy {
   double earliest_ = 0;  ///< earliest time of the next `advance`, between frames
   bool between_frames_ = false;
   bool timed_ = false;
-  bool may_find_incident_;  ///< the scene asks for pairs of two bodies over one vertex set
+  bool may_find_incident_;      ///< the scene asks for pairs of two bodies over one vertex set
   AnswerHistory histories_[2];  ///< [Answer] of `compare_answers`
   std::optional<Abilities> abilities_;
 };

@@ -186,8 +186,8 @@ class Session {
     timed(times.plan_changes, [&] { strategy_->flight_plans_changed(playback_.time(), changes); });
   }
   /// Inserts and deletes at the current time; the scene given to the constructor stays unchanged. Vertices of
-  /// a vertex set are given for one of its bodies. Throws std::logic_error if the strategy does not declare geometry changes, and std::invalid_argument (see
-  /// ChangingScene) without any change.
+  /// a vertex set are given for one of its bodies. Throws std::logic_error if the strategy does not declare
+  /// geometry changes, and std::invalid_argument (see ChangingScene) without any change.
   void change_geometry(const GeometryChange<S>& change, PhaseTimes& times) {
     if (!changing_) throw std::logic_error("'" + info_->id + "' does not declare geometry changes");
     watch_.check_added(change);

@@ -206,8 +206,8 @@ std::vector<BodyChange> body_changes(const SceneView<S>& scene, const GeometryCh
 
 template class ChangingScene<float>;
 template class ChangingScene<double>;
-#define KBVH_INSTANTIATE(S)                                                                           \
-  template std::vector<BodyChange> body_changes(const SceneView<S>&, const GeometryChange<S>&);       \
+#define KBVH_INSTANTIATE(S)                                                                               \
+  template std::vector<BodyChange> body_changes(const SceneView<S>&, const GeometryChange<S>&);           \
   template std::vector<PlanChange<S>> changes_of_bodies(const Scene<S>&, std::span<const PlanChange<S>>); \
   template GeometryChange<S> changes_of_bodies(const Scene<S>&, const GeometryChange<S>&);
 KBVH_INSTANTIATE(float)

@@ -150,8 +150,7 @@ struct Scene {
   }
   /// Returns whether two bodies consist of the same vertices: one body, or two that name one vertex set.
   bool same_vertices(std::uint32_t a, std::uint32_t b) const {
-    return a == b ||
-           (bodies[a].vertex_set != own_vertices && bodies[a].vertex_set == bodies[b].vertex_set);
+    return a == b || (bodies[a].vertex_set != own_vertices && bodies[a].vertex_set == bodies[b].vertex_set);
   }
   /// Returns the first body that consists of the vertices of this one.
   std::uint32_t first_of_set(std::uint32_t body) const {
@@ -178,8 +177,8 @@ std::uint32_t add_body_over(Scene<S>& scene, std::uint32_t body, std::string nam
       if (other.vertex_set != own_vertices) unused = std::max(unused, other.vertex_set + 1);
     set = unused;
   }
-  scene.bodies.push_back({std::move(name), std::move(primitives), scene.bodies[body].plans,
-                          scene.bodies[body].vertex_set});
+  scene.bodies.push_back(
+      {std::move(name), std::move(primitives), scene.bodies[body].plans, scene.bodies[body].vertex_set});
   return std::uint32_t(scene.bodies.size() - 1);
 }
 

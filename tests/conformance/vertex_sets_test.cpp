@@ -1,0 +1,601 @@
+// Bodies over one vertex set: every strategy answers as for bodies with copies of the vertices, but for pairs
+// of primitives with a common vertex, which are no pairs. Positions exist once, and changes of plans and of
+// vertices that are made for one body reach all.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "core/facade/world.hpp"
+#include "core/judge/audit.hpp"
+#include "core/judge/oracle.hpp"
+#include "core/judge/sort_pairs.hpp"
+#include "core/judge/verify.hpp"
+#include "core/judge/verify_changes.hpp"
+#include "core/parallel/workers.hpp"
+#include "core/topology/renumber.hpp"
+#include "tests/conformance/check.hpp"
+#include "tests/support/random.hpp"
+#include "tests/support/synthetic_scenes.hpp"
+
+namespace kbvh::test::vertex_sets_test {
+namespace {
+
+using Corners = std::vector<std::uint32_t>;
+
+// ---- Scenes
+
+/// The primitives of a sheet of side x side vertices, folded once along y.
+struct Sheet {
+  explicit Sheet(std::uint32_t vertices_a_side) : side(vertices_a_side) {
+    const auto vertex = [this](std::uint32_t x, std::uint32_t y) { return y * side + x; };
+    std::set<Corners> all_edges;
+    for (std::uint32_t y = 0; y < side; ++y)
+      for (std::uint32_t x = 0; x < side; ++x) {
+        points.push_back({vertex(x, y)});
+        if (x + 1 == side || y + 1 == side) continue;
+        for (Corners face : {Corners{vertex(x, y), vertex(x + 1, y), vertex(x, y + 1)},
+                             Corners{vertex(x + 1, y), vertex(x + 1, y + 1), vertex(x, y + 1)}}) {
+          for (std::size_t i = 0; i < 3; ++i)
+            all_edges.insert({std::min(face[i], face[(i + 1) % 3]), std::max(face[i], face[(i + 1) % 3])});
+          faces.push_back(std::move(face));
+        }
+      }
+    edges.assign(all_edges.begin(), all_edges.end());
+  }
+  std::uint32_t side;
+  std::vector<Corners> points, edges, faces;
+};
+
+Primitives primitives(PrimitiveKind kind, std::span<const Corners> lists) {
+  Primitives made;
+  made.kind = kind;
+  for (const Corners& corners : lists) made.add(corners);
+  return made;
+}
+
+/// Keyframes at 0, 1, 2 of a sheet whose two halves lie close to each other and move. On integers, elements
+/// often touch exactly.
+enum class Numbers : std::uint8_t { any, integers };
+template <class S>
+FlightPlans<S> folding(const Sheet& sheet, Numbers numbers) {
+  Random random(11);
+  std::vector<S> positions;
+  for (int keyframe = 0; keyframe < 3; ++keyframe)
+    for (std::uint32_t y = 0; y < sheet.side; ++y)
+      for (std::uint32_t x = 0; x < sheet.side; ++x) {
+        const double fold = std::abs(double(x) - (sheet.side - 1) / 2.0);
+        const double much = numbers == Numbers::integers ? 2 : 1;
+        const double at[3] = {fold + 0.4 * much * random.unit(), y + 0.4 * much * random.unit(),
+                              0.5 * much * random.unit()};
+        for (const double c : at)
+          positions.push_back(S(numbers == Numbers::integers ? std::round(c) + 0.0 : c));
+      }
+  return FlightPlans<S>(sheet.side * sheet.side, {0, 1, 2}, std::move(positions));
+}
+
+template <class S>
+Body<S> first_body(std::string name, Primitives primitives, FlightPlans<S> plans) {
+  Body<S> body;
+  body.name = std::move(name);
+  body.primitives = std::move(primitives);
+  body.plans = std::move(plans);
+  return body;
+}
+
+/// Vertices, edges and faces of one mesh. `polygons`: exact pairs; else pairs of boxes.
+enum class Level : std::uint8_t { boxes, polygons };
+/// Which pairs of bodies are asked for.
+enum class Asked : std::uint8_t { of_two_bodies, within_bodies_too };
+template <class S>
+TestScene<S> elements(Level level, Numbers numbers, Asked asked) {
+  const Sheet sheet(5);
+  const bool exact = level == Level::polygons;
+  const PrimitiveKind nets = exact ? PrimitiveKind::polygons : PrimitiveKind::control_nets;
+  TestScene<S> test;
+  Scene<S>& scene = test.scene;
+  scene.name = std::string("elements") + (exact ? "_exact" : "_boxes") +
+               (numbers == Numbers::integers ? "_integers" : "");
+  scene.bodies.push_back(first_body("vertices",
+                                    primitives(exact ? nets : PrimitiveKind::points, sheet.points),
+                                    folding<S>(sheet, numbers)));
+  add_body_over(scene, 0, "edges", primitives(nets, sheet.edges));
+  add_body_over(scene, 0, "faces", primitives(nets, sheet.faces));
+  scene.pairs = {{0, 1}, {0, 2}, {1, 2}};
+  if (asked == Asked::within_bodies_too) {
+    scene.name += "_self";
+    for (std::uint32_t body = 0; body < 3; ++body) scene.pairs.push_back({body, body});
+  }
+  return test;
+}
+
+/// A cloth of two panels with a common seam next to its fold, and a sheet of its own that crosses both.
+template <class S>
+TestScene<S> panels() {
+  const Sheet sheet(6);
+  std::vector<Corners> left, right;
+  for (const Corners& face : sheet.faces) {
+    std::uint32_t most = 0;
+    for (const std::uint32_t v : face) most = std::max(most, v % sheet.side);
+    (most <= 3 ? left : right).push_back(face);
+  }
+  TestScene<S> test;
+  Scene<S>& scene = test.scene;
+  scene.name = "panels";
+  scene.bodies.push_back(
+      first_body("left", primitives(PrimitiveKind::polygons, left), folding<S>(sheet, Numbers::any)));
+  std::vector<S> crossing;
+  for (std::uint32_t y = 0; y < 3; ++y)
+    for (std::uint32_t x = 0; x < 3; ++x)
+      for (const double c : {0.3 + 0.9 * x, 0.2 + 2.2 * y, 0.6 * x - 0.7}) crossing.push_back(S(c));
+  scene.bodies.push_back(first_body("crossing", primitives(PrimitiveKind::polygons, Sheet(3).faces),
+                                    FlightPlans<S>(9, {0}, std::move(crossing))));
+  add_body_over(scene, 0, "right", primitives(PrimitiveKind::polygons, right));
+  scene.pairs = all_pairs(scene.bodies);
+  return test;
+}
+
+/// Gives vertices new plans at a frame between keyframes and at a keyframe, under different bodies.
+template <class S>
+TestScene<S> with_plan_changes(TestScene<S> test) {
+  test.scene.name += "_plans";
+  std::uint32_t body = 0;
+  for (const double time : {0.5, 1.0, 1.75}) {
+    auto& step = test.script.steps.emplace_back();
+    step.time = time;
+    for (const std::uint32_t vertex : {7u, 12u, 18u}) {
+      PlanChange<S> change;
+      change.body = test.scene.same_vertices(0, body) ? body : 0;
+      change.vertex = vertex;
+      change.times = {time + 0.5};
+      change.positions = {S(vertex % 5), S(2), S(time)};
+      change.velocity[2] = S(-1);
+      step.changes.push_back(change);
+      body = (body + 1) % std::uint32_t(test.scene.bodies.size());
+    }
+  }
+  return test;
+}
+
+/// Inserts a vertex with primitives in two bodies of the set, then deletes some.
+template <class S>
+TestScene<S> with_geometry_changes(TestScene<S> test) {
+  test.scene.name += "_geometry";
+  const std::uint32_t added = test.scene.bodies[0].plans.vertex_count();
+  const std::uint32_t last = std::uint32_t(test.scene.bodies.size() - 1);
+  const std::uint32_t corners[2] = {test.scene.bodies[0].primitives.offsets[1],
+                                    test.scene.bodies[last].primitives.offsets[1]};
+  const auto list = [&](std::uint32_t which, Corners vertices) {
+    vertices.resize(corners[which]);
+    return vertices;
+  };
+  auto& first = test.script.steps.emplace_back();
+  first.time = 0.5;
+  typename GeometryChange<S>::NewVertex vertex;
+  vertex.body = last;
+  vertex.position[0] = S(1.1);
+  vertex.position[1] = S(2.2);
+  vertex.plan.velocity[2] = S(0.3);
+  first.geometry.vertices = {vertex, vertex};
+  first.geometry.vertices[1].body = 0;
+  first.geometry.vertices[1].position[0] = S(1.6);
+  first.geometry.primitives = {{0, list(0, {added, 6, 8})},
+                               {last, list(1, {added, added + 1, 12})},
+                               {last, list(1, {added + 1, 3, 9})}};
+  auto& second = test.script.steps.emplace_back();
+  second.time = 1.25;
+  const std::uint32_t primitive = test.scene.bodies[last].primitives.count();
+  second.geometry.removed_primitives = {
+      {last, primitive}, {last, primitive + 1}, {last, 2}, {0, test.scene.bodies[0].primitives.count()}};
+  second.geometry.removed_vertices = {{last, added}};
+  return test;
+}
+
+template <class S>
+std::vector<TestScene<S>> all_scenes() {
+  std::vector<TestScene<S>> scenes;
+  for (const Asked asked : {Asked::of_two_bodies, Asked::within_bodies_too}) {
+    scenes.push_back(elements<S>(Level::boxes, Numbers::any, asked));
+    scenes.push_back(elements<S>(Level::polygons, Numbers::integers, asked));
+    scenes.push_back(with_plan_changes(elements<S>(Level::boxes, Numbers::any, asked)));
+    scenes.push_back(with_geometry_changes(elements<S>(Level::boxes, Numbers::any, asked)));
+  }
+  scenes.push_back(panels<S>());
+  scenes.push_back(with_plan_changes(panels<S>()));
+  scenes.push_back(with_geometry_changes(panels<S>()));
+  for (TestScene<S>& test : scenes) test.frames = frame_times(test.scene, 4);
+  return scenes;
+}
+
+// ---- The truth, from bodies with copies of the vertices
+
+/// Lists a change of a vertex set for all bodies over it, by hand.
+template <class S, class Item>
+void list_for_all(const Scene<S>& scene, std::vector<Item>& items) {
+  std::vector<Item> all;
+  for (const Item& item : items)
+    for (std::uint32_t body = 0; body < scene.bodies.size(); ++body)
+      if (scene.same_vertices(item.body, body)) {
+        all.push_back(item);
+        all.back().body = body;
+      }
+  items = std::move(all);
+}
+
+template <class S>
+TestScene<S> unshared(TestScene<S> test) {
+  for (auto& step : test.script.steps) {
+    list_for_all(test.scene, step.changes);
+    list_for_all(test.scene, step.geometry.vertices);
+    list_for_all(test.scene, step.geometry.removed_vertices);
+  }
+  for (Body<S>& body : test.scene.bodies) body.vertex_set = own_vertices;
+  return test;
+}
+
+template <class S>
+bool have_common_vertex(const Scene<S>& scene, const PrimitivePair& pair) {
+  const auto a = scene.bodies[pair.body_a].primitives[pair.primitive_a];
+  const auto b = scene.bodies[pair.body_b].primitives[pair.primitive_b];
+  return std::find_first_of(a.begin(), a.end(), b.begin(), b.end()) != a.end();
+}
+
+/// The pairs at each frame, before the changes that are made at it.
+struct Truth {
+  std::vector<PairBuffer> frames;
+  std::size_t pairs_of_sets = 0, incident = 0;
+};
+
+template <class S>
+Truth truth_of(const TestScene<S>& shared) {
+  const TestScene<S> test = unshared(shared);
+  Playback<S> playback(test.scene);
+  ChangingScene<S> changing(test.scene);
+  Truth truth;
+  auto step = test.script.steps.begin();
+  for (const double t : test.frames) {
+    playback.seek(t);
+    PairBuffer& pairs = truth.frames.emplace_back();
+    for (const PrimitivePair& pair : brute_force_pairs(changing.scene(), playback)) {
+      const bool of_set = pair.body_a != pair.body_b && shared.scene.same_vertices(pair.body_a, pair.body_b);
+      if (of_set && have_common_vertex(changing.scene(), pair)) {
+        ++truth.incident;
+        continue;
+      }
+      truth.pairs_of_sets += of_set ? 1 : 0;
+      pairs.push_back(pair);
+    }
+    for (; step != test.script.steps.end() && step->time <= t; ++step) {
+      playback.change_plans(t, step->changes);
+      if (!step->geometry.empty()) changing.apply(step->geometry, playback);
+    }
+  }
+  return truth;
+}
+
+// ---- Contestants
+
+/// Returns how a contestant's answers at the frames differ from the truth, first of all at which frame; or
+/// nothing. Every other frame is asked as changes alone.
+template <class S>
+std::string difference(Session<S>& session, const TestScene<S>& test, const Truth& truth) {
+  PhaseTimes ignored;
+  PairBuffer pairs, candidates, begun, ended;
+  ChangeReplay replays[2];
+  auto step = test.script.steps.begin();
+  for (std::size_t f = 0; f < test.frames.size(); ++f) {
+    const double t = test.frames[f];
+    const std::string at = "t = " + std::to_string(t) + ": ";
+    if (f == 0)
+      session.reset(t);
+    else
+      session.advance(t, ignored);
+    for (const Answer answer : {Answer::candidates, Answer::pairs}) {
+      session.changes(answer, begun, ended, ignored);
+      const std::string fault = replays[std::size_t(answer)].add(begun, ended);
+      if (!fault.empty()) return at + fault;
+    }
+    if (session.info().guarantee != Guarantee::approximate && replays[1].pairs() != truth.frames[f])
+      return at + "the changes add up to other pairs";
+    for (const PrimitivePair& pair : replays[0].pairs())
+      if (session.scene().same_vertices(pair.body_a, pair.body_b) &&
+          have_common_vertex(session.scene(), pair))
+        return at + "the changes of candidates begin a pair of incident primitives";
+    if (f % 2 == 0) {
+      candidates.clear();
+      session.strategy().candidates_at(t, candidates, {});
+      for (const PrimitivePair& pair : candidates)
+        if (test.scene.same_vertices(pair.body_a, pair.body_b) && have_common_vertex(session.scene(), pair))
+          return at + "candidate " + text(pair) + " is of incident primitives";
+      session.query(pairs, ignored);
+      sort_pairs(pairs);
+      if (session.info().guarantee != Guarantee::approximate && pairs != truth.frames[f])
+        return at + std::to_string(pairs.size()) + " pairs, not " + std::to_string(truth.frames[f].size());
+    }
+    for (; step != test.script.steps.end() && step->time <= t; ++step) {
+      if (!step->changes.empty()) session.change_plans(step->changes, ignored);
+      if (!step->geometry.empty()) session.change_geometry(step->geometry, ignored);
+    }
+  }
+  return {};
+}
+
+template <class S>
+class VertexSets : public testing::Test {};
+using Scalars = testing::Types<float, double>;
+TYPED_TEST_SUITE(VertexSets, Scalars);
+
+TYPED_TEST(VertexSets, AnswerLikeCopiesWithoutIncidentPairs) {
+  using S = TypeParam;
+  for (const TestScene<S>& test : all_scenes<S>()) {
+    const Truth truth = truth_of(test);
+    EXPECT_GT(truth.pairs_of_sets, 50u) << test.scene.name;
+    EXPECT_GT(truth.incident, 50u) << test.scene.name;
+    std::size_t took_part = 0;
+    for (const StrategyEntry& entry : registry()) {
+      if (!skipped(entry, test).empty() || !unsuitable_bodies(entry.info, test.scene).empty()) continue;
+      ++took_part;
+      Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred});
+      EXPECT_EQ(difference(session, test, truth), "") << entry.info.id << " on " << test.scene.name;
+    }
+    EXPECT_GT(took_part, 5u) << test.scene.name;
+  }
+}
+
+TYPED_TEST(VertexSets, BothOraclesAgree) {
+  using S = TypeParam;
+  for (const TestScene<S>& test : all_scenes<S>()) {
+    const Truth truth = truth_of(test);
+    Playback<S> playback(test.scene);
+    ChangingScene<S> changing(test.scene);
+    auto step = test.script.steps.begin();
+    for (std::size_t f = 0; f < test.frames.size(); ++f) {
+      playback.seek(test.frames[f]);
+      EXPECT_EQ(brute_force_pairs(changing.scene(), playback), truth.frames[f]) << test.scene.name;
+      EXPECT_EQ(sweep_pairs(changing.scene(), playback), truth.frames[f]) << test.scene.name;
+      for (; step != test.script.steps.end() && step->time <= test.frames[f]; ++step) {
+        playback.change_plans(test.frames[f], step->changes);
+        if (!step->geometry.empty()) changing.apply(step->geometry, playback);
+      }
+    }
+  }
+}
+
+TYPED_TEST(VertexSets, SpansNameNoIncidentPairs) {
+  using S = TypeParam;
+  TestScene<S> test = panels<S>();
+  test.frames = frame_times(test.scene, 4);
+  const Truth truth = truth_of(test);
+  std::size_t strategies = 0;
+  for (const StrategyEntry& entry : registry()) {
+    if (!entry.info.can.spans || !skipped(entry, test).empty()) continue;
+    ++strategies;
+    Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred});
+    session.reset(test.frames[0]);
+    SpanBuffer spans;
+    for (std::size_t f = 1; f < test.frames.size(); ++f) {
+      spans.clear();
+      session.spans(test.frames[f], spans);
+      std::set<PrimitivePair> named;
+      for (const PairSpan& span : spans) {
+        named.insert(span.pair);
+        EXPECT_FALSE(test.scene.same_vertices(span.pair.body_a, span.pair.body_b) &&
+                     have_common_vertex(test.scene, span.pair))
+            << entry.info.id << ", " << text(span.pair);
+      }
+      for (const PrimitivePair& pair : truth.frames[f])
+        EXPECT_TRUE(named.contains(pair)) << entry.info.id << " lacks " << text(pair);
+    }
+  }
+  EXPECT_GT(strategies, 1u);
+}
+
+/// A seam is no contact: panels that rest touch each other there and nowhere else.
+TYPED_TEST(VertexSets, SeamsAreNoContacts) {
+  using S = TypeParam;
+  const Sheet sheet(4);
+  const std::span<const Corners> faces(sheet.faces);
+  std::vector<S> flat;
+  for (int keyframe = 0; keyframe < 2; ++keyframe)
+    for (std::uint32_t y = 0; y < 4; ++y)
+      for (std::uint32_t x = 0; x < 4; ++x)
+        for (const std::uint32_t c : {x, y, x * y}) flat.push_back(S(c) + S(keyframe));
+  Scene<S> scene;
+  scene.bodies.push_back(first_body("left", primitives(PrimitiveKind::polygons, faces.first(7)),
+                                    FlightPlans<S>(16, {0, 1}, std::move(flat))));
+  add_body_over(scene, 0, "right", primitives(PrimitiveKind::polygons, faces.subspan(7)));
+  scene.pairs = {{0, 1}};
+  const auto contacts = [](const Scene<S>& played) {
+    const StrategyEntry& entry = find_strategy("bottom_up");
+    Session<S> session(played, {&entry, {}, entry.info.topology.preferred});
+    session.reset(0);
+    ContactBuffer found;
+    PhaseTimes ignored;
+    session.contacts(1, found, ignored);
+    EXPECT_FALSE(session.swept_pairs().empty());  // neighbours' other features could touch
+    return found.size();
+  };
+  EXPECT_EQ(contacts(scene), 0u);
+  for (Body<S>& body : scene.bodies) body.vertex_set = own_vertices;
+  EXPECT_GT(contacts(scene), 10u);
+}
+
+// ---- Once for all bodies
+
+TYPED_TEST(VertexSets, HavePositionsOnce) {
+  using S = TypeParam;
+  const TestScene<S> test = elements<S>(Level::boxes, Numbers::any, Asked::of_two_bodies);
+  EXPECT_EQ(test.scene.vertex_count(), 25u);
+  for (const std::uint32_t threads : {1u, std::min(2u, most_threads())}) {
+    Playback<S> playback(test.scene);
+    playback.use_threads(threads);
+    EXPECT_EQ(playback.body_count(), 3u);
+    playback.seek(0.25);
+    EXPECT_FALSE(playback.all_current(2));
+    const std::uint32_t some[] = {3, 4};
+    playback.fetch(1, some);
+    EXPECT_EQ(playback.fetched(), 2u);
+    EXPECT_EQ(playback.position(0, 3), playback.positions(2) + 9);
+    EXPECT_EQ(playback.position(2, 4), playback.positions(1) + 12);
+    EXPECT_EQ(playback.fetched(), 2u);
+    playback.evaluate_all();
+    std::vector<S> expected(3 * 25 + 1);
+    test.scene.bodies[1].plans.evaluate(0.25, expected.data());
+    for (std::uint32_t body = 0; body < 3; ++body) {
+      EXPECT_EQ(playback.positions(body), playback.positions(0));
+      EXPECT_TRUE(playback.all_current(body));
+      EXPECT_EQ(&playback.plans(body), &playback.plans(0));
+    }
+    EXPECT_TRUE(std::equal(expected.begin(), expected.end() - 1, playback.positions(0)));
+  }
+}
+
+TYPED_TEST(VertexSets, TakePositionsHandedInOnce) {
+  using S = TypeParam;
+  const Sheet sheet(5);
+  const FlightPlans<S> plans = folding<S>(sheet, Numbers::any);
+  const auto keyframe = [&](std::size_t k) {
+    return std::vector<S>(plans.keyframe(k), plans.keyframe(k) + 75);
+  };
+  const auto indices = [](const std::vector<Corners>& lists) {
+    Corners all;
+    for (const Corners& corners : lists) all.insert(all.end(), corners.begin(), corners.end());
+    return all;
+  };
+  const Corners faces = indices(sheet.faces), edges = indices(sheet.edges);
+  Corners offsets;
+  for (std::uint32_t e = 0; e <= sheet.edges.size(); ++e) offsets.push_back(2 * e);
+  for (const char* id : {"bottom_up", "dirty_refit", "lbvh", "sweep"}) {
+    World world(sizeof(S) == 4 ? Precision::float32 : Precision::float64);
+    const std::vector<S> start = keyframe(0);
+    EXPECT_EQ(world.add_body("faces", {faces}, std::span<const S>(start)), 0u);
+    EXPECT_THROW(world.add_body_over(1, "edges", {edges, offsets}), std::invalid_argument);
+    const Corners beyond{24, 25};
+    EXPECT_THROW(world.add_body_over(0, "edges", {beyond, std::span(offsets).first(2)}),
+                 std::invalid_argument);
+    EXPECT_EQ(world.add_body_over(0, "edges", {edges, offsets}), 1u);
+    world.add_pair(1, 0);
+    world.start(id);
+    EXPECT_THROW(world.add_body_over(0, "late", {edges, offsets}), std::logic_error);
+    std::vector<WorldPair> pairs, truth;
+    std::size_t all = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::vector<S> now = keyframe(k);
+      if (k < 2) {
+        world.set_positions(k % 2 == 0 ? 1 : 0, std::span<const S>(now));
+      } else {
+        // Only some vertices move: lists for one body are true of the other as well.
+        std::vector<S> some = keyframe(1);
+        const Corners moved{6, 12, 13};
+        for (const std::uint32_t v : moved) std::copy_n(now.begin() + 3 * v, 3, some.begin() + 3 * v);
+        world.set_positions(0, std::span<const S>(some), moved);
+      }
+      world.advance(double(k + 1));
+      world.pairs(pairs);
+      world.true_pairs(truth);
+      const auto before = [](const WorldPair& a, const WorldPair& b) {
+        return std::pair(a.primitive_a, a.primitive_b) < std::pair(b.primitive_a, b.primitive_b);
+      };
+      std::sort(pairs.begin(), pairs.end(), before);
+      EXPECT_EQ(pairs, truth) << id << ", " << k;
+      all += pairs.size();
+      for (std::uint32_t body = 0; body < 2; ++body) {
+        WorldAudit audit;
+        if (world.audit(body, audit)) EXPECT_EQ(audit.invalid, 0u) << id << ", " << audit.first_fault;
+      }
+    }
+    EXPECT_GT(all, 5u);
+  }
+}
+
+TEST(VertexSetsOfScenes, AreChecked) {
+  const TestScene<float> test = elements<float>(Level::boxes, Numbers::any, Asked::of_two_bodies);
+  EXPECT_NO_THROW(validate(test.scene));
+  EXPECT_NE(hash(test.scene), hash(unshared(test).scene));
+  Scene<float> other_number = test.scene;
+  for (Body<float>& body : other_number.bodies) body.vertex_set = 77;
+  EXPECT_EQ(hash(test.scene), hash(other_number));
+  Scene<float> copies = test.scene;
+  copies.bodies[2].plans = folding<float>(Sheet(5), Numbers::any);  // equal, but not shared
+  EXPECT_THROW(validate(copies), std::invalid_argument);
+  EXPECT_THROW(renumber_in_leaf_order(test.scene, {}), std::invalid_argument);
+  // A second set gets a number of its own.
+  Scene<float> two = panels<float>().scene;
+  EXPECT_EQ(add_body_over(two, 1, "again", two.bodies[1].primitives), 3u);
+  EXPECT_TRUE(two.same_vertices(1, 3));
+  EXPECT_FALSE(two.same_vertices(0, 1));
+  EXPECT_EQ(two.first_of_set(3), 1u);
+}
+
+TEST(VertexSetsOfScenes, RefuseVerticesThatAnotherBodyUses) {
+  const auto test = panels<float>();
+  const StrategyEntry& entry = find_strategy("bottom_up");
+  Session<float> session(test.scene, {&entry, {}, entry.info.topology.preferred});
+  session.reset(0);
+  PhaseTimes ignored;
+  GeometryChange<float> change;
+  change.removed_vertices = {{0, 35}};  // a corner of the right panel
+  EXPECT_THROW(session.change_geometry(change, ignored), std::invalid_argument);
+  change.removed_vertices = {{0, 0}, {2, 0}};
+  for (std::uint32_t p = 0; p < test.scene.bodies[0].primitives.count(); ++p)
+    change.removed_primitives.push_back({0, p});
+  EXPECT_THROW(session.change_geometry(change, ignored), std::invalid_argument);  // one vertex, named twice
+  change.removed_vertices = {{2, 0}};
+  session.change_geometry(change, ignored);
+  PlanChange<float> plan;
+  plan.vertex = 0;
+  EXPECT_THROW(session.change_plans(std::span(&plan, 1), ignored), std::invalid_argument);
+}
+
+// ---- Seeded faults
+
+/// The contestant plays copies: it has no set whose incident pairs it could leave out.
+TYPED_TEST(VertexSets, IncidentPairsThatGetThroughAreSeen) {
+  using S = TypeParam;
+  for (const TestScene<S>& test :
+       {panels<S>(), elements<S>(Level::boxes, Numbers::any, Asked::of_two_bodies)}) {
+    TestScene<S> played = test;
+    played.frames = frame_times(test.scene, 4);
+    const Truth truth = truth_of(played);
+    const TestScene<S> copies = unshared(played);
+    const StrategyEntry& entry = find_strategy("bottom_up");
+    Session<S> session(copies.scene, {&entry, {}, entry.info.topology.preferred});
+    EXPECT_NE(difference(session, played, truth), "");
+  }
+}
+
+/// A strategy that is told of new plans for one body only keeps the old bounds of the others.
+TYPED_TEST(VertexSets, PlansThatReachOneBodyOnlyAreSeen) {
+  using S = TypeParam;
+  TestScene<S> test = panels<S>();
+  const StrategyEntry& entry = find_strategy("kinetic_aabb");
+  Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred});
+  PlanChange<S> change;
+  change.vertex = 35;  // of the right panel, body 2; told of body 0
+  change.velocity[1] = S(-50);
+  enum class Told : std::uint8_t { one, all };
+  const auto right_is_valid = [&](Told told) {
+    session.reset(0.5);
+    PhaseTimes ignored;
+    const std::span<const PlanChange<S>> changes(&change, 1);
+    if (told == Told::all) {
+      session.change_plans(changes, ignored);
+    } else {
+      session.playback().change_plans(0.5, changes);
+      session.strategy().flight_plans_changed(0.5, changes);
+    }
+    session.advance(0.875, ignored);
+    PairBuffer pairs;
+    session.query(pairs, ignored);
+    session.playback().evaluate_all();
+    const auto view = session.strategy().audit_view(2);
+    return audit(*view, test.scene.bodies[2].primitives, session.playback().positions(2)).invalid == 0;
+  };
+  EXPECT_TRUE(right_is_valid(Told::all));
+  EXPECT_FALSE(right_is_valid(Told::one));
+}
+
+}  // namespace
+}  // namespace kbvh::test::vertex_sets_test
