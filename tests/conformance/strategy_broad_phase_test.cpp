@@ -104,14 +104,16 @@ TYPED_TEST(StrategiesAsBroadPhases, FindWhatBroadPhaseFinds) {
     StrategyBroadPhase<S> broad(id);
     build(broad, mesh, S(0.1));
     CandidateBuffer expected, found;
+    std::size_t in_all = 0;
     for (const CandidateKind kind : candidate_kinds) {
       own.detect(kind, expected);
       broad.detect(kind, found);
       std::sort(expected.begin(), expected.end());
       std::sort(found.begin(), found.end());
       EXPECT_EQ(found, expected) << id << ", " << name(kind);
-      EXPECT_GT(found.size(), 100u);
+      in_all += found.size();
     }
+    EXPECT_GT(in_all, 1000u) << id;
   }
 }
 
