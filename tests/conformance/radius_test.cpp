@@ -164,7 +164,8 @@ PairBuffer near_pairs(const Scene<S>& scene, double t, double distance) {
     const auto &all_a = boxes[bodies.first], &all_b = boxes[bodies.second];
     for (std::uint32_t a = 0; a < all_a.size(); ++a)
       for (std::uint32_t b = bodies.first == bodies.second ? a + 1 : 0; b < all_b.size(); ++b) {
-        bool near = !share_vertex(scene.bodies[bodies.first].primitives[a],
+        bool near = !scene.same_vertices(bodies.first, bodies.second) ||
+                    !share_vertex(scene.bodies[bodies.first].primitives[a],
                                   scene.bodies[bodies.second].primitives[b]);
         for (int axis = 0; near && axis < 3; ++axis)
           near = !farther(all_a[a].upper[axis], all_b[b].lower[axis], distance) &&
