@@ -142,7 +142,9 @@ template <class Take>
 void ContactFinder<S>::vertex_face(std::uint32_t body_a, std::uint32_t vertex, std::uint32_t body_b,
                                    std::uint32_t face, const Take& take) {
   const std::uint32_t(&corners)[3] = features_[body_b].faces()[face].vertices;
-  if (body_a == body_b && (vertex == corners[0] || vertex == corners[1] || vertex == corners[2])) return;
+  if (scene_->same_vertices(body_a, body_b) &&
+      (vertex == corners[0] || vertex == corners[1] || vertex == corners[2]))
+    return;
   MovingPoints points;
   for (int end = 0; end < 2; ++end) {
     const double** p = end == 0 ? points.begin : points.end;
@@ -159,7 +161,8 @@ void ContactFinder<S>::edge_edge(std::uint32_t body_a, std::uint32_t edge_a, std
   if (body_a == body_b && edge_a > edge_b) std::swap(edge_a, edge_b);
   const auto& a = features_[body_a].edges()[edge_a].vertices;
   const auto& b = features_[body_b].edges()[edge_b].vertices;
-  if (body_a == body_b && (a[0] == b[0] || a[0] == b[1] || a[1] == b[0] || a[1] == b[1])) return;
+  if (scene_->same_vertices(body_a, body_b) && (a[0] == b[0] || a[0] == b[1] || a[1] == b[0] || a[1] == b[1]))
+    return;
   MovingPoints points;
   for (int end = 0; end < 2; ++end) {
     const double** p = end == 0 ? points.begin : points.end;

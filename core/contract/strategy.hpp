@@ -17,6 +17,7 @@
 #include "core/scene/motion_view.hpp"
 #include "core/scene/pair_difference.hpp"
 #include "core/scene/pairs.hpp"
+#include "core/scene/self_pairs.hpp"
 #include "core/topology/builders.hpp"
 #include "core/topology/topology.hpp"
 #include "core/topology/traversal.hpp"
@@ -146,10 +147,14 @@ struct AuditView {
 /// The public functions check times and reset counters, then call the protected ones; a strategy overrides
 /// the protected ones and may rely on these checks. It derives from an interface of queries.hpp or
 /// event_source.hpp for each optional ability. Strategies derive from CountedStrategy, which counts.
+///
+/// Bodies over one vertex set are two bodies like any others to a strategy: the public functions remove pairs
+/// of their primitives that have a common vertex.
 template <class S>
 class Strategy {
  public:
-  Strategy(const SceneView<S>& scene, const SampledMotion<S>& motion) : scene_(scene), sampled_(motion) {}
+  Strategy(const SceneView<S>& scene, const SampledMotion<S>& motion)
+      : scene_(scene), sampled_(motion), may_find_incident_(has_pairs_of_sets(scene)) {}
   virtual ~Strategy();
   Strategy(const Strategy&) = delete;
   Strategy& operator=(const Strategy&) = delete;
@@ -178,7 +183,7 @@ class Strategy {
   /// that take a time, throws std::invalid_argument if the strategy does not stand at t.
   QueryStatus candidates_at(double t, PairBuffer& out, const Budget& budget) {
     stand_at(t);
-    return find_candidates(t, out, budget);
+    return find_pairs_apart(t, out, budget);
   }
 
   /// Keeps the candidates that intersect; phase "triangle tests". The default is kbvh's exact test.
@@ -204,10 +209,12 @@ class Strategy {
     if (&begun == &ended) throw std::invalid_argument("changes need two buffers, not one twice");
     begun.clear();
     ended.clear();
-    if (AnswersChanges<S>* query = abilities().changes)
+    if (AnswersChanges<S>* query = abilities().changes) {
       query->find_changes(t, answer, begun, ended);
-    else
+      for (PairBuffer* pairs : {&begun, &ended}) remove_incident_pairs(*pairs, 0);
+    } else {
       compare_answers(t, answer, begun, ended);
+    }
   }
 
   /// Appends the pairs over [t0, t1] with closed spans that enclose every contact of the exact plan and of
@@ -218,7 +225,11 @@ class Strategy {
     AnswersSpans<S>& query = able(abilities().spans, "spans");
     stand_at(t0);
     move_to(t1);
+    const std::size_t before = out.size();
     query.find_spans(t0, t1, out);
+    if (may_find_incident_)
+      remove_incident(scene_, out, before,
+                      [](const PairSpan& span) -> const PrimitivePair& { return span.pair; });
   }
 
   /// Announces `swept_pairs` for the motion that begins at t, the current time of the strategy and of the
@@ -229,8 +240,9 @@ class Strategy {
     query.prepare_sweep(t);
   }
   /// Appends the primitive pairs that may touch while every vertex moves on a straight line from its position
-  /// at t0 to its position at t1, canonical, each once. Pairs within one body include primitives that share a
-  /// vertex, because their other features may touch. `start_sweep` must precede the call. The motion view
+  /// at t0 to its position at t1, canonical, each once. Pairs within one body, or of bodies over one vertex
+  /// set, include primitives that share a vertex, because their other features may touch. `start_sweep` must
+  /// precede the call. The motion view
   /// stands at t1, with all positions; `before` holds the positions at t0 ([body], then [vertex][3]). No knot
   /// of any plan lies strictly between t0 and t1. Afterwards the next sweep may be announced from t1, or
   /// `reset` starts over; frames in between are not answered.
@@ -336,7 +348,7 @@ class Strategy {
   void compare_answers(double t, Answer answer, PairBuffer& begun, PairBuffer& ended) {
     AnswerHistory& history = histories_[std::size_t(answer)];
     PairBuffer& found = history.next();
-    find_candidates(t, found, Budget{});
+    find_pairs_apart(t, found, Budget{});
     if (answer == Answer::pairs) confirm_candidates(t, found);
     history.take_next(begun, ended);
   }
@@ -382,6 +394,18 @@ class Strategy {
     if (interface == nullptr) throw std::logic_error(std::string("this strategy does not declare ") + what);
     return *interface;
   }
+  /// Finds candidates, without those that are no pair because their bodies have one vertex set.
+  QueryStatus find_pairs_apart(double t, PairBuffer& out, const Budget& budget) {
+    const std::size_t before = out.size();
+    const QueryStatus status = find_candidates(t, out, budget);
+    remove_incident_pairs(out, before);
+    return status;
+  }
+  void remove_incident_pairs(PairBuffer& pairs, std::size_t from) const {
+    if (!may_find_incident_) return;
+    remove_incident(scene_, pairs, from,
+                    [](const PrimitivePair& pair) -> const PrimitivePair& { return pair; });
+  }
   void check_not_before(double t) const {
     const double earliest = between_frames_ ? earliest_ : time_;
     if (!(t >= earliest) || !std::isfinite(t))
@@ -407,6 +431,7 @@ class Strategy {
   double earliest_ = 0;  ///< earliest time of the next `advance`, between frames
   bool between_frames_ = false;
   bool timed_ = false;
+  bool may_find_incident_;      ///< the scene asks for pairs of two bodies over one vertex set
   AnswerHistory histories_[2];  ///< [Answer] of `compare_answers`
   std::optional<Abilities> abilities_;
 };

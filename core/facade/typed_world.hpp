@@ -119,6 +119,16 @@ struct TypedWorld {
     return std::uint32_t(scene.bodies.size() - 1);
   }
 
+  std::uint32_t add_over(std::uint32_t body, const std::string& name, const Connectivity& connectivity) {
+    check_not_started();
+    check_body(body);
+    Scene<S> alone;
+    alone.bodies.push_back({name, primitives_of(connectivity), scene.bodies[body].plans});
+    validate(alone);
+    cut_polygons(alone);
+    return add_body_over(scene, body, name, std::move(alone.bodies[0].primitives));
+  }
+
   template <class T>
   void set(std::uint32_t body, std::span<const T> positions,
            std::optional<std::span<const std::uint32_t>> moved = {}) {
@@ -142,7 +152,8 @@ struct TypedWorld {
           throw std::invalid_argument("vertex " + std::to_string(vertex) + " moved, but body '" +
                                       target.name + "' has " + std::to_string(size / 3));
     give(body, positions, size);
-    tell_moved(session().strategy(), body, moved);
+    for (std::uint32_t other = 0; other < played->bodies.size(); ++other)
+      if (played->same_vertices(body, other)) tell_moved(session().strategy(), other, moved);
   }
   template <class T>
   void give(std::uint32_t body, std::span<const T> positions, std::size_t size) {

@@ -50,6 +50,11 @@ std::uint32_t World::add_body(const std::string& name, const Connectivity& conne
   return in_scalar([&](auto& world) { return world.add(name, connectivity, positions); });
 }
 
+std::uint32_t World::add_body_over(std::uint32_t body, const std::string& name,
+                                   const Connectivity& connectivity) {
+  return in_scalar([&](auto& world) { return world.add_over(body, name, connectivity); });
+}
+
 void World::add_pair(std::uint32_t body_a, std::uint32_t body_b) {
   in_scalar([&](auto& world) {
     world.check_not_started();

@@ -269,6 +269,10 @@ class World {
                          std::span<const float> positions);
   std::uint32_t add_body(const std::string& name, const Connectivity& connectivity,
                          std::span<const double> positions);
+  /// Adds a body over the vertices of another one, as the vertices, edges and faces of a mesh are: positions,
+  /// motion and vertex ids are the same. Positions, plans and vertices change at run time for one of these
+  /// bodies, and so for all. Primitives with a common vertex are no pair. Returns the new body's id.
+  std::uint32_t add_body_over(std::uint32_t body, const std::string& name, const Connectivity& connectivity);
   /// Requests pairs of these two bodies, or within one body if both are the same. Without any such call, the
   /// pairs of all bodies are requested, and no pairs within a body.
   void add_pair(std::uint32_t body_a, std::uint32_t body_b);

@@ -61,11 +61,12 @@ PairBuffer brute_force_pairs(const Scene<S>& scene, Playback<S>& playback) {
   for (const BodyPair& pair : scene.pairs) {
     const Body<S>&a = scene.bodies[pair.first], &b = scene.bodies[pair.second];
     const bool within = pair.first == pair.second;
+    const bool one_set = scene.same_vertices(pair.first, pair.second);
     for (std::uint32_t i = 0; i < a.primitives.count(); ++i) {
       Interruptible::check();
       for (std::uint32_t j = within ? i + 1 : 0; j < b.primitives.count(); ++j)
         if (a.primitives.alive(i) && b.primitives.alive(j) &&
-            !(within && share_vertex(a.primitives[i], a.primitives[j])) &&
+            !(one_set && share_vertex(a.primitives[i], b.primitives[j])) &&
             truly_meet(pair.first, i, pair.second, j))
           result.push_back({pair.first, i, pair.second, j});
     }
@@ -101,7 +102,8 @@ PairBuffer sweep_pairs(const Scene<S>& scene, Playback<S>& playback) {
   for (const BodyPair& pair : scene.pairs) {
     const Box<S>&whole_a = whole[pair.first], &whole_b = whole[pair.second];
     if (!overlap(whole_a, whole_b)) continue;
-    const Body<S>& a = scene.bodies[pair.first];
+    const Primitives &a = scene.bodies[pair.first].primitives, &b = scene.bodies[pair.second].primitives;
+    const bool one_set = scene.same_vertices(pair.first, pair.second);
     int axis = 0;
     for (int d = 1; d < 3; ++d)
       if (double(whole_a.upper[d]) - double(whole_a.lower[d]) >
@@ -110,9 +112,9 @@ PairBuffer sweep_pairs(const Scene<S>& scene, Playback<S>& playback) {
     const auto items_a = sorted_items(pair.first, axis, whole_b),
                items_b = sorted_items(pair.second, axis, whole_a);
     const auto report = [&](const Item& x, const Item& y) {
-      if (pair.first == pair.second &&
-          (x.primitive >= y.primitive || share_vertex(a.primitives[x.primitive], a.primitives[y.primitive])))
-        return;  // each of these pairs is found twice: from both lists
+      // Each pair within one body is found twice: from both lists.
+      if (pair.first == pair.second && x.primitive >= y.primitive) return;
+      if (one_set && share_vertex(a[x.primitive], b[y.primitive])) return;
       if (overlap(x.box, y.box) && truly_meet(pair.first, x.primitive, pair.second, y.primitive))
         result.push_back({pair.first, x.primitive, pair.second, y.primitive});
     };

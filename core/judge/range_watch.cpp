@@ -185,7 +185,7 @@ void watch_script(const Scene<S>& scene, const PlanScript<S>& script, double las
     if (step.geometry.empty()) continue;
     watch.check_added(step.geometry);
     changing->apply(step.geometry, playback);
-    watch.added(playback, step.geometry);
+    watch.added(playback, changes_of_bodies(scene, step.geometry));
   }
   watch.check(playback, last);
 }

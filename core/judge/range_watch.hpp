@@ -24,7 +24,7 @@ class RangeWatch {
   void start(const Playback<S>& playback);
   /// Registers a new plan of a vertex. O(log knots).
   void changed(const Playback<S>& playback, std::uint32_t body, std::uint32_t vertex);
-  /// Registers added vertices. O(change).
+  /// Registers added vertices; takes `changes_of_bodies`. O(change).
   void added(const Playback<S>& playback, const GeometryChange<S>& change);
   /// Throws std::invalid_argument with body, vertex, time and value if a vertex has left the range at t. O(1)
   /// before the earliest time at which a vertex may leave it. O(vertices) after that time, if the plan that

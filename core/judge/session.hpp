@@ -41,6 +41,7 @@ class Session {
         info_(&contestant.entry->info),
         changing_(info_->can.geometry_changes ? std::optional<ChangingScene<S>>(scene) : std::nullopt),
         scene_(changing_ ? &changing_->scene() : &scene),
+        has_vertex_sets_(scene.has_vertex_sets()),
         view_(*scene_),
         playback_(scene),
         watch_(*info_) {
@@ -171,7 +172,8 @@ class Session {
   const PairBuffer& swept_pairs() const { return sweep_->pairs(); }
 
   /// Applies the changes at the current time: all of them, or none if one is invalid (see
-  /// Playback::change_plans) or beyond the range of the contestant.
+  /// Playback::change_plans) or beyond the range of the contestant. Changes of a vertex set are given for one
+  /// of its bodies, and told to the strategy for all.
   void change_plans(std::span<const PlanChange<S>> changes, PhaseTimes& times) {
     watch_.check_plans(changes);
     timed(times.motion, [&] {
@@ -179,19 +181,24 @@ class Session {
       playback_.change_plans(playback_.time(), changes);
     });
     for (const PlanChange<S>& change : changes) watch_.changed(playback_, change.body, change.vertex);
+    std::vector<PlanChange<S>> of_bodies;
+    if (has_vertex_sets_) changes = of_bodies = changes_of_bodies(*scene_, changes);
     timed(times.plan_changes, [&] { strategy_->flight_plans_changed(playback_.time(), changes); });
   }
-  /// Inserts and deletes at the current time; the scene given to the constructor stays unchanged. Throws
-  /// std::logic_error if the strategy does not declare geometry changes, and std::invalid_argument (see
-  /// ChangingScene) without any change.
+  /// Inserts and deletes at the current time; the scene given to the constructor stays unchanged. Vertices of
+  /// a vertex set are given for one of its bodies. Throws std::logic_error if the strategy does not declare
+  /// geometry changes, and std::invalid_argument (see ChangingScene) without any change.
   void change_geometry(const GeometryChange<S>& change, PhaseTimes& times) {
     if (!changing_) throw std::logic_error("'" + info_->id + "' does not declare geometry changes");
     watch_.check_added(change);
     timed(times.motion, [&] { changing_->apply(change, playback_); });
     geometry_changed_ = true;
     sweep_.reset();  // its features belong to the old geometry
-    watch_.added(playback_, change);
-    timed(times.geometry_changes, [&] { strategy_->geometry_changed(playback_.time(), change); });
+    std::optional<GeometryChange<S>> repeated;
+    if (has_vertex_sets_) repeated = changes_of_bodies(*scene_, change);
+    const GeometryChange<S>& of_bodies = repeated ? *repeated : change;
+    watch_.added(playback_, of_bodies);
+    timed(times.geometry_changes, [&] { strategy_->geometry_changed(playback_.time(), of_bodies); });
   }
 
   Strategy<S>& strategy() { return *strategy_; }
@@ -221,6 +228,7 @@ class Session {
   const Info* info_;
   std::optional<ChangingScene<S>> changing_;  ///< for strategies that support geometry changes
   const Scene<S>* scene_;
+  bool has_vertex_sets_;
   SceneView<S> view_;
   Playback<S> playback_;
   RangeWatch<S> watch_;

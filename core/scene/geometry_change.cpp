@@ -1,6 +1,7 @@
 #include "core/scene/geometry_change.hpp"
 
 #include <algorithm>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
@@ -16,7 +17,38 @@ namespace {
 std::string text(const char* what, std::uint32_t id, std::uint32_t body) {
   return std::string(what) + " " + std::to_string(id) + " of body " + std::to_string(body);
 }
+
+/// Appends an item for each body over the vertex set of its body.
+template <class S, class Item>
+void repeat_for_bodies(const Scene<S>& scene, const Item& item, std::vector<Item>& out) {
+  if (item.body >= scene.bodies.size() || scene.bodies[item.body].vertex_set == own_vertices) {
+    out.push_back(item);
+    return;
+  }
+  for (std::uint32_t body = 0; body < scene.bodies.size(); ++body) {
+    if (!scene.same_vertices(item.body, body)) continue;
+    out.push_back(item);
+    out.back().body = body;
+  }
+}
 }  // namespace
+
+template <class S>
+std::vector<PlanChange<S>> changes_of_bodies(const Scene<S>& scene, std::span<const PlanChange<S>> changes) {
+  std::vector<PlanChange<S>> all;
+  for (const PlanChange<S>& change : changes) repeat_for_bodies(scene, change, all);
+  return all;
+}
+
+template <class S>
+GeometryChange<S> changes_of_bodies(const Scene<S>& scene, const GeometryChange<S>& change) {
+  GeometryChange<S> all;
+  all.primitives = change.primitives;
+  all.removed_primitives = change.removed_primitives;
+  for (const auto& vertex : change.vertices) repeat_for_bodies(scene, vertex, all.vertices);
+  for (const auto& removed : change.removed_vertices) repeat_for_bodies(scene, removed, all.removed_vertices);
+  return all;
+}
 
 template <class S>
 void ChangingScene<S>::count_uses(std::uint32_t body) {
@@ -106,7 +138,10 @@ void ChangingScene<S>::check(const GeometryChange<S>& change, const Playback<S>&
 }
 
 template <class S>
-void ChangingScene<S>::apply(const GeometryChange<S>& change, Playback<S>& playback) {
+void ChangingScene<S>::apply(const GeometryChange<S>& given, Playback<S>& playback) {
+  std::optional<GeometryChange<S>> repeated;
+  if (scene_.has_vertex_sets()) repeated = changes_of_bodies(scene_, given);
+  const GeometryChange<S>& change = repeated ? *repeated : given;
   check(change, playback);
   for (const auto& removed : change.removed_primitives) {
     Primitives& primitives = scene_.bodies[removed.body].primitives;
@@ -122,10 +157,10 @@ void ChangingScene<S>::apply(const GeometryChange<S>& change, Playback<S>& playb
   }
   for (const auto& vertex : change.vertices) {
     scene_.bodies[vertex.body].plans.add_vertex(playback.time(), vertex.plan, vertex.position);
-    playback.add_vertex(vertex.body, vertex.plan, vertex.position);
     auto& uses = bodies_[vertex.body].uses;
     if (!uses.empty()) uses.push_back(0);
   }
+  for (const auto& vertex : given.vertices) playback.add_vertex(vertex.body, vertex.plan, vertex.position);
   for (const auto& primitive : change.primitives) {
     Primitives& primitives = scene_.bodies[primitive.body].primitives;
     primitives.add(primitive.vertices);
@@ -171,7 +206,12 @@ std::vector<BodyChange> body_changes(const SceneView<S>& scene, const GeometryCh
 
 template class ChangingScene<float>;
 template class ChangingScene<double>;
-template std::vector<BodyChange> body_changes(const SceneView<float>&, const GeometryChange<float>&);
-template std::vector<BodyChange> body_changes(const SceneView<double>&, const GeometryChange<double>&);
+#define KBVH_INSTANTIATE(S)                                                                               \
+  template std::vector<BodyChange> body_changes(const SceneView<S>&, const GeometryChange<S>&);           \
+  template std::vector<PlanChange<S>> changes_of_bodies(const Scene<S>&, std::span<const PlanChange<S>>); \
+  template GeometryChange<S> changes_of_bodies(const Scene<S>&, const GeometryChange<S>&);
+KBVH_INSTANTIATE(float)
+KBVH_INSTANTIATE(double)
+#undef KBVH_INSTANTIATE
 
 }  // namespace kbvh

@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/scene/playback.hpp"
@@ -8,7 +9,8 @@
 namespace kbvh {
 
 /// Vertices and primitives that are inserted and deleted at one time. Ids are stable: inserted items get the
-/// next free ids of their body in the given order, and no id is ever reused.
+/// next free ids of their body in the given order, and no id is ever reused. Vertices of bodies over one
+/// vertex set are inserted and deleted once, under any of these bodies.
 template <class S>
 struct GeometryChange {
   struct NewVertex {
@@ -32,6 +34,14 @@ struct GeometryChange {
     return vertices.empty() && primitives.empty() && removed_primitives.empty() && removed_vertices.empty();
   }
 };
+
+/// Returns the changes that each body sees: what is changed on a vertex set under one body is repeated, in
+/// the same order, for all bodies over that set. Other changes, and those of bodies that do not exist, stay
+/// as they are.
+template <class S>
+std::vector<PlanChange<S>> changes_of_bodies(const Scene<S>& scene, std::span<const PlanChange<S>> changes);
+template <class S>
+GeometryChange<S> changes_of_bodies(const Scene<S>& scene, const GeometryChange<S>& change);
 
 /// A scene whose geometry changes at run time: a copy of the connectivity (keyframes are shared) with
 /// insertions and deletions. Removed items keep their ids: primitives are marked, vertices rest on their
@@ -60,6 +70,7 @@ class ChangingScene {
     std::vector<std::uint8_t> removed;  ///< per vertex; may be shorter than the number of vertices
     bool is_removed(std::uint32_t vertex) const { return vertex < removed.size() && removed[vertex] != 0; }
   };
+  /// Takes changes_of_bodies.
   void check(const GeometryChange<S>& change, const Playback<S>& playback);
   void count_uses(std::uint32_t body);
 
@@ -74,7 +85,7 @@ struct BodyChange {
   std::vector<std::uint32_t> removed_primitives{};
 };
 
-/// Returns one entry for each changed body, ascending.
+/// Returns one entry for each changed body, ascending. Takes `changes_of_bodies`.
 template <class S>
 std::vector<BodyChange> body_changes(const SceneView<S>& scene, const GeometryChange<S>& change);
 

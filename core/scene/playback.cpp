@@ -22,13 +22,19 @@ Playback<S>::Playback(const Scene<S>& scene) {
   check_cut(scene);
   std::size_t largest = 0;
   double start = 0;
-  for (const auto& body : scene.bodies) {
-    BodyState state;
+  for (std::uint32_t b = 0; b < scene.bodies.size(); ++b) {
+    const Body<S>& body = scene.bodies[b];
+    if (const std::uint32_t first = scene.first_of_set(b); first != b) {
+      set_of_.push_back(set_of_[first]);
+      continue;
+    }
+    SetState state;
     state.plans = state.scene_plans = body.plans;
     state.positions.assign(std::size_t(3) * body.plans.vertex_count() + 1, S(0));
     state.stamp.assign(body.plans.vertex_count(), 0);
     largest = std::max<std::size_t>(largest, body.plans.vertex_count());
-    bodies_.push_back(std::move(state));
+    set_of_.push_back(std::uint32_t(sets_.size()));
+    sets_.push_back(std::move(state));
   }
   if (!scene.bodies.empty()) start = overlaid_keyframes(scene).front();
   stale_.reserve(largest);
@@ -40,10 +46,10 @@ void Playback<S>::seek(double t) {
   check_time(t, "a frame");
   time_ = t;
   if (++epoch_ == 0) {  // after 2^32 frames the stamps start over
-    for (auto& state : bodies_) std::fill(state.stamp.begin(), state.stamp.end(), 0);
+    for (auto& state : sets_) std::fill(state.stamp.begin(), state.stamp.end(), 0);
     epoch_ = 1;
   }
-  for (auto& state : bodies_) {
+  for (auto& state : sets_) {
     state.fetched = 0;
     if (state.plans.moving() && !state.plans.is_handed_in()) state.all_current = false;
   }
@@ -52,7 +58,7 @@ void Playback<S>::seek(double t) {
 template <class S>
 void Playback<S>::evaluate_all() {
   if (workers_.several()) return evaluate_shared();
-  for (auto& state : bodies_) {
+  for (auto& state : sets_) {
     if (state.all_current) continue;
     state.plans.evaluate(time_, state.positions.data());
     state.all_current = true;
@@ -64,52 +70,50 @@ void Playback<S>::use_threads(std::uint32_t threads) {
   workers_ = Workers(threads);
   if (!workers_.several()) return;
   // Moves the positions to the memory of the threads that will evaluate them.
-  std::vector<UnfilledArray<S>> placed(bodies_.size());
-  for (std::size_t body = 0; body < bodies_.size(); ++body)
-    placed[body].resize(bodies_[body].positions.size());
-  cut_items([](const BodyState& state) { return state.plans.moving(); });
+  std::vector<UnfilledArray<S>> placed(sets_.size());
+  for (std::size_t set = 0; set < sets_.size(); ++set) placed[set].resize(sets_[set].positions.size());
+  cut_items([](const SetState& state) { return state.plans.moving(); });
   workers_.for_each(items_.size(), [&](std::size_t i, std::uint32_t) {
     const Item item = items_[i];
-    for (std::uint32_t body = item.body; body < item.end_body; ++body) {
-      const auto from = bodies_[body].positions.begin();
-      const std::size_t end = item.end == 0 ? placed[body].size() : std::size_t(3) * item.end;
+    for (std::uint32_t set = item.set; set < item.end_set; ++set) {
+      const auto from = sets_[set].positions.begin();
+      const std::size_t end = item.end == 0 ? placed[set].size() : std::size_t(3) * item.end;
       std::copy(from + std::ptrdiff_t(3) * item.begin, from + std::ptrdiff_t(end),
-                placed[body].begin() + std::ptrdiff_t(3) * item.begin);
+                placed[set].begin() + std::ptrdiff_t(3) * item.begin);
     }
   });
-  for (std::size_t body = 0; body < bodies_.size(); ++body) {
-    BodyState& state = bodies_[body];
+  for (std::size_t set = 0; set < sets_.size(); ++set) {
+    SetState& state = sets_[set];
     if (!state.plans.moving()) continue;
     const std::size_t shared = std::size_t(3) * state.plans.keyframed_count();
     std::copy(state.positions.begin() + std::ptrdiff_t(shared), state.positions.end(),
-              placed[body].begin() + std::ptrdiff_t(shared));
-    state.positions = std::move(placed[body]);
+              placed[set].begin() + std::ptrdiff_t(shared));
+    state.positions = std::move(placed[set]);
   }
 }
 
-/// Cuts the work on the bodies for which `which(state)` is true: large ones in parts, small ones several at a
+/// Cuts the work on the sets for which `which(state)` is true: large ones in parts, small ones several at a
 /// time.
 template <class S>
 template <class Which>
 void Playback<S>::cut_items(const Which& which) {
   items_.clear();
-  std::uint32_t gathered = none_gathered;  // vertices of the last item, if bodies may be added to it
-  for (std::uint32_t body = 0; body < body_count(); ++body) {
-    const FlightPlans<S>& plans = bodies_[body].plans;
+  std::uint32_t gathered = none_gathered;  // vertices of the last item, if sets may be added to it
+  for (std::uint32_t set = 0; set < sets_.size(); ++set) {
+    const FlightPlans<S>& plans = sets_[set].plans;
     const std::uint32_t vertices = plans.vertex_count();
-    if (!which(bodies_[body])) {
+    if (!which(sets_[set])) {
       gathered = none_gathered;
     } else if (vertices < 2 * vertices_at_once) {
       if (gathered + vertices > vertices_at_once) {
-        items_.push_back({body, body, 0, 0});
+        items_.push_back({set, set, 0, 0});
         gathered = 0;
       }
-      items_.back().end_body = body + 1;
+      items_.back().end_set = set + 1;
       gathered += vertices;
     } else {
       for (std::uint32_t begin = 0; begin < plans.keyframed_count(); begin += vertices_at_once)
-        items_.push_back(
-            {body, body + 1, begin, std::min(begin + vertices_at_once, plans.keyframed_count())});
+        items_.push_back({set, set + 1, begin, std::min(begin + vertices_at_once, plans.keyframed_count())});
       gathered = none_gathered;
     }
   }
@@ -117,18 +121,18 @@ void Playback<S>::cut_items(const Which& which) {
 
 template <class S>
 void Playback<S>::evaluate_shared() {
-  cut_items([](const BodyState& state) { return !state.all_current; });
+  cut_items([](const SetState& state) { return !state.all_current; });
   workers_.for_each(items_.size(), [this](std::size_t i, std::uint32_t) {
     const Item item = items_[i];
-    for (std::uint32_t body = item.body; body < item.end_body; ++body) {
-      BodyState& state = bodies_[body];
+    for (std::uint32_t set = item.set; set < item.end_set; ++set) {
+      SetState& state = sets_[set];
       if (item.end == 0)
         state.plans.evaluate(time_, state.positions.data());
       else
         state.plans.evaluate_keyframed(time_, item.begin, item.end, state.positions.data());
     }
   });
-  for (BodyState& state : bodies_) {
+  for (SetState& state : sets_) {
     if (state.all_current) continue;
     if (state.plans.vertex_count() >= 2 * vertices_at_once) evaluate_own(state);
     state.all_current = true;
@@ -136,7 +140,7 @@ void Playback<S>::evaluate_shared() {
 }
 
 template <class S>
-void Playback<S>::evaluate_own(BodyState& state) {
+void Playback<S>::evaluate_own(SetState& state) {
   if (!state.plans.has_own_plans()) return;
   const std::size_t parts = std::size_t(8) * workers_.threads();
   workers_.for_each(parts, [&](std::size_t part, std::uint32_t) {
@@ -145,7 +149,7 @@ void Playback<S>::evaluate_own(BodyState& state) {
 }
 
 template <class S>
-void Playback<S>::evaluate(BodyState& state) {
+void Playback<S>::evaluate(SetState& state) {
   const std::uint32_t vertices = state.plans.vertex_count();
   if (!workers_.several() || vertices < 2 * vertices_at_once)
     return state.plans.evaluate(time_, state.positions.data());
@@ -159,14 +163,14 @@ void Playback<S>::evaluate(BodyState& state) {
 
 template <class S>
 void Playback<S>::hand_in(std::uint32_t body, const S* positions) {
-  if (body >= bodies_.size() || !bodies_[body].plans.is_handed_in())
+  if (body >= set_of_.size() || !plans(body).is_handed_in())
     throw std::invalid_argument("positions are handed in for body " + std::to_string(body) +
                                 ", which does not accept them");
-  bodies_[body].given = positions;
+  state_of(body).given = positions;
 }
 
 template <class S>
-void Playback<S>::fetch_stale(BodyState& state, std::span<const std::uint32_t> vertices) {
+void Playback<S>::fetch_stale(SetState& state, std::span<const std::uint32_t> vertices) {
   // A static body is evaluated only once.
   if (!state.plans.moving() || std::uint64_t(16) * state.fetched > state.plans.vertex_count()) {
     fetch_all(state);
@@ -199,7 +203,7 @@ void Playback<S>::fetch_stale(BodyState& state, std::span<const std::uint32_t> v
 }
 
 template <class S>
-void Playback<S>::fetch_all(BodyState& state) {
+void Playback<S>::fetch_all(SetState& state) {
   if (state.plans.moving()) fetched_ += state.plans.vertex_count() - state.fetched;
   evaluate(state);
   state.all_current = true;
@@ -211,10 +215,10 @@ void Playback<S>::change_plans(double t, std::span<const PlanChange<S>> changes)
     throw std::invalid_argument("plan changes at " + number_text(t) + " while the motion stands at " +
                                 number_text(time_));
   for (const PlanChange<S>& change : changes) {
-    if (change.body >= bodies_.size())
+    if (change.body >= body_count())
       throw std::invalid_argument("plan change for body " + std::to_string(change.body) + " of " +
-                                  std::to_string(bodies_.size()));
-    const FlightPlans<S>& plans = bodies_[change.body].plans;
+                                  std::to_string(body_count()));
+    const FlightPlans<S>& plans = this->plans(change.body);
     if (plans.is_handed_in())
       throw std::invalid_argument("plan change for body " + std::to_string(change.body) +
                                   ", whose positions are handed in");
@@ -223,12 +227,12 @@ void Playback<S>::change_plans(double t, std::span<const PlanChange<S>> changes)
   }
   // A vertex's position at t is the same before and after a change, so the order does not matter.
   for (const PlanChange<S>& change : changes)
-    bodies_[change.body].plans.change(t, change, position(change.body, change.vertex));
+    state_of(change.body).plans.change(t, change, position(change.body, change.vertex));
 }
 
 template <class S>
 void Playback<S>::restore_plans() {
-  for (auto& state : bodies_) {
+  for (auto& state : sets_) {
     // Assigned even if no plan changed: the copy has none of the data that is computed on demand for segments
     // (steps, translations), so no play profits from an earlier one.
     const bool changed = state.plans.has_own_plans();
@@ -243,7 +247,7 @@ void Playback<S>::restore_plans() {
 
 template <class S>
 void Playback<S>::add_vertex(std::uint32_t body, const PlanChange<S>& plan, const S* position) {
-  BodyState& state = bodies_[body];
+  SetState& state = state_of(body);
   state.plans.add_vertex(time_, plan, position);
   // The last scalar is padding.
   for (int axis = 0; axis < 3; ++axis) {

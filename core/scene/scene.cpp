@@ -42,6 +42,15 @@ void validate(const Scene<S>& scene) {
                                       std::to_string(body.plans.vertex_count()));
     }
   }
+  for (std::uint32_t body = 0; body < scene.bodies.size(); ++body) {
+    const std::uint32_t first = scene.first_of_set(body);
+    const FlightPlans<S>&plans = scene.bodies[body].plans, &of_set = scene.bodies[first].plans;
+    if (plans.keyframe_times().data() != of_set.keyframe_times().data() ||
+        plans.vertex_count() != of_set.vertex_count() || plans.is_handed_in() != of_set.is_handed_in())
+      throw std::invalid_argument("body '" + scene.bodies[body].name + "' and body '" +
+                                  scene.bodies[first].name +
+                                  "' name one vertex set, but their plans are not copies of one object");
+  }
   for (const BodyPair& pair : scene.pairs)
     if (pair.first > pair.second || pair.second >= scene.bodies.size())
       throw std::invalid_argument("body pair (" + std::to_string(pair.first) + ", " +
@@ -53,7 +62,9 @@ template <class S>
 std::uint64_t hash(const Scene<S>& scene) {
   Hasher hasher;
   hasher.mix(sizeof(S));
-  for (const auto& body : scene.bodies) {
+  for (std::uint32_t b = 0; b < scene.bodies.size(); ++b) {
+    const Body<S>& body = scene.bodies[b];
+    if (body.vertex_set != own_vertices) hasher.mix(scene.first_of_set(b));
     hasher.mix(std::uint64_t(body.primitives.kind));
     hasher.list(body.primitives.offsets);
     hasher.list(body.primitives.vertices);

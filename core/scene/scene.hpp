@@ -5,6 +5,7 @@
 #include <limits>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/base/assert.hpp"
@@ -107,12 +108,21 @@ struct Primitives {
   }
 };
 
+/// The vertex set of a body that shares no vertices.
+inline constexpr std::uint32_t own_vertices = std::numeric_limits<std::uint32_t>::max();
+
 /// One body: fixed connectivity and the flight plans of its vertices.
 template <class S>
 struct Body {
   std::string name;
   Primitives primitives;
   FlightPlans<S> plans;
+  /// The vertex set that the body names, by any number. Bodies that name one set consist of the same
+  /// vertices, as the vertices, edges and faces of a mesh do: ids, plans and positions are those of the set,
+  /// and `plans` are copies of one object, which share its keyframes (`add_body_over`). Changes of plans and
+  /// vertices at run time are made once, for any body of the set, and reach all of them. Primitives with a
+  /// common vertex are no pair, in one body or in two.
+  std::uint32_t vertex_set = own_vertices;
 };
 
 /// Two bodies that are tested against each other, first < second; or one body twice: pairs within the body.
@@ -134,10 +144,43 @@ struct Scene {
   }
   std::uint64_t vertex_count() const {
     std::uint64_t total = 0;
-    for (const auto& body : bodies) total += body.plans.vertex_count();
+    for (std::uint32_t body = 0; body < bodies.size(); ++body)
+      if (first_of_set(body) == body) total += bodies[body].plans.vertex_count();
     return total;
   }
+  /// Returns whether two bodies consist of the same vertices: one body, or two that name one vertex set.
+  bool same_vertices(std::uint32_t a, std::uint32_t b) const {
+    return a == b || (bodies[a].vertex_set != own_vertices && bodies[a].vertex_set == bodies[b].vertex_set);
+  }
+  /// Returns the first body that consists of the vertices of this one.
+  std::uint32_t first_of_set(std::uint32_t body) const {
+    if (bodies[body].vertex_set == own_vertices) return body;
+    std::uint32_t first = 0;
+    while (!same_vertices(first, body)) ++first;
+    return first;
+  }
+  /// Returns whether some body names a vertex set.
+  bool has_vertex_sets() const {
+    return std::any_of(bodies.begin(), bodies.end(),
+                       [](const Body<S>& body) { return body.vertex_set != own_vertices; });
+  }
 };
+
+/// Adds a body over the vertices of another body; both then name one vertex set. Returns its id. `body` must
+/// exist.
+template <class S>
+std::uint32_t add_body_over(Scene<S>& scene, std::uint32_t body, std::string name, Primitives primitives) {
+  std::uint32_t& set = scene.bodies[body].vertex_set;
+  if (set == own_vertices) {
+    std::uint32_t unused = 0;
+    for (const Body<S>& other : scene.bodies)
+      if (other.vertex_set != own_vertices) unused = std::max(unused, other.vertex_set + 1);
+    set = unused;
+  }
+  scene.bodies.push_back(
+      {std::move(name), std::move(primitives), scene.bodies[body].plans, scene.bodies[body].vertex_set});
+  return std::uint32_t(scene.bodies.size() - 1);
+}
 
 /// Returns every unordered pair of different bodies with at least one moving body.
 template <class S>
@@ -153,7 +196,8 @@ std::vector<BodyPair> all_pairs(const std::vector<Body<S>>& bodies) {
 }
 
 /// Throws std::invalid_argument, naming body, primitive and value, if a primitive refers to a vertex that
-/// does not exist, has no vertex, or a body pair is out of range. Flight plans check themselves.
+/// does not exist, has no vertex, a body pair is out of range, or the plans of two bodies over one vertex set
+/// are not copies of one object. Flight plans check themselves.
 template <class S>
 void validate(const Scene<S>& scene);
 
@@ -182,6 +226,8 @@ class SceneView {
   const Primitives& primitives(std::uint32_t body) const { return scene_->bodies[body].primitives; }
   std::uint32_t vertex_count(std::uint32_t body) const { return scene_->bodies[body].plans.vertex_count(); }
   std::span<const BodyPair> pairs() const { return scene_->pairs; }
+  /// Returns whether two bodies consist of the same vertices (Scene::same_vertices).
+  bool same_vertices(std::uint32_t a, std::uint32_t b) const { return scene_->same_vertices(a, b); }
   /// Returns false for a body that is known to rest unless its plans are changed.
   bool moving(std::uint32_t body) const { return scene_->bodies[body].plans.moving(); }
 

@@ -1,5 +1,6 @@
 #pragma once
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <utility>
@@ -50,6 +51,31 @@ std::size_t keep_self_pairs(const Primitives* primitives, LeavesOf leaves, Pair*
 inline bool has_self_pairs(std::span<const BodyPair> pairs) {
   return std::any_of(pairs.begin(), pairs.end(),
                      [](const BodyPair& pair) { return pair.first == pair.second; });
+}
+
+/// Returns whether a scene asks for pairs of two bodies over one vertex set.
+template <class S>
+bool has_pairs_of_sets(const SceneView<S>& scene) {
+  return std::any_of(scene.pairs().begin(), scene.pairs().end(), [&](const BodyPair& pair) {
+    return pair.first != pair.second && scene.same_vertices(pair.first, pair.second);
+  });
+}
+
+/// Removes pairs of two bodies over one vertex set whose primitives have a common vertex, from the pair
+/// `from` of a list on; keeps the order. pair_of(item) is a PrimitivePair. Such primitives are no pair, like
+/// those within one body; here it does not matter which strategy found them.
+template <class S, class List, class PairOf>
+void remove_incident(const SceneView<S>& scene, List& list, std::size_t from, const PairOf& pair_of) {
+  std::size_t kept = from;
+  for (std::size_t i = from; i < list.size(); ++i) {
+    const auto& pair = pair_of(list[i]);
+    if (pair.body_a != pair.body_b && scene.same_vertices(pair.body_a, pair.body_b) &&
+        share_vertex(scene.primitives(pair.body_a)[pair.primitive_a],
+                     scene.primitives(pair.body_b)[pair.primitive_b]))
+      continue;
+    list[kept++] = list[i];
+  }
+  list.resize(kept);
 }
 
 }  // namespace kbvh

@@ -1,6 +1,7 @@
 #include "core/topology/renumber.hpp"
 
 #include <limits>
+#include <stdexcept>
 
 namespace kbvh {
 
@@ -69,6 +70,9 @@ RenumberedScene<S> renumber_in_leaf_order(const Scene<S>& scene, const BuilderCo
   result.scene.pairs = scene.pairs;
   const double start = overlaid_keyframes(scene).front();
   for (const Body<S>& body : scene.bodies) {
+    if (body.vertex_set != own_vertices)
+      throw std::invalid_argument("body '" + body.name +
+                                  "' is not renumbered: it shares its vertices with other bodies");
     std::vector<S> positions(std::size_t(3) * body.plans.vertex_count());
     body.plans.evaluate(start, positions.data());
     const auto boxes = primitive_boxes(body.primitives, positions.data());

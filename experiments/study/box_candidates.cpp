@@ -15,8 +15,8 @@ namespace kbvh::experiments {
 
 namespace {
 
-/// Features of one kind as primitives of a body. With a margin every vertex becomes two: its lowest and its
-/// highest corner.
+/// Features of one kind as primitives over the vertices of two frames. With a margin every vertex becomes
+/// two: its lowest and its highest corner.
 class Features {
  public:
   Features(const FramePair& frames, BoxMargin margin) : margin_(margin) {
@@ -44,22 +44,23 @@ class Features {
     }
   }
 
-  /// Makes a body with a primitive for each list of vertices.
+  /// Makes a primitive of each list of vertices.
   template <class Lists>
-  Body<double> body(const char* name, const Lists& lists) const {
-    Body<double> body;
-    body.name = name;
-    body.primitives.kind = PrimitiveKind::control_nets;
+  Primitives primitives(const Lists& lists) const {
+    Primitives made;
+    made.kind = PrimitiveKind::control_nets;
     std::vector<std::uint32_t> primitive;
     for (const auto& list : lists) {
       primitive.assign(list.begin(), list.end());
       if (margin_ == BoxMargin::one_ulp)
         for (const std::uint32_t v : list) primitive.push_back(vertices_ + v);
-      body.primitives.add(primitive);
+      made.add(primitive);
     }
+    return made;
+  }
+  FlightPlans<double> plans() const {
     const std::uint32_t count = margin_ == BoxMargin::none ? vertices_ : 2 * vertices_;
-    body.plans = FlightPlans<double>(count, {0.0, 1.0}, positions_);
-    return body;
+    return FlightPlans<double>(count, {0.0, 1.0}, positions_);
   }
 
  private:
@@ -74,13 +75,11 @@ PairBuffer swept(const Scene<double>& scene, const std::string& strategy) {
     throw io::InputError("the strategy '" + strategy + "' finds no contacts, so it has no swept pairs");
   Session<double> session(scene, {&entry, {}, entry.info.topology.preferred});
   session.reset(0);
-  std::vector<std::vector<double>> copies;
-  std::vector<const double*> before;
-  for (std::uint32_t body = 0; body < scene.bodies.size(); ++body) {
-    const double* positions = session.playback().positions(body);
-    copies.emplace_back(positions, positions + std::size_t(3) * scene.bodies[body].plans.vertex_count() + 1);
-  }
-  for (const auto& copy : copies) before.push_back(copy.data());
+  // All bodies have the same vertices.
+  const double* const positions = session.playback().positions(0);
+  const std::vector<double> copy(positions,
+                                 positions + std::size_t(3) * scene.bodies[0].plans.vertex_count() + 1);
+  const std::vector<const double*> before(scene.bodies.size(), copy.data());
   session.strategy().start_sweep(0);
   session.playback().seek(1);
   session.playback().evaluate_all();
@@ -99,9 +98,9 @@ BoxCandidates box_candidates(const FramePair& frames, BoxMargin margin, const st
   for (std::uint32_t v = 0; v < frames.positions[0].size() / 3; ++v) vertices.push_back({v});
   Scene<double> scene;
   scene.name = frames.name;
-  scene.bodies.push_back(features.body("vertices", vertices));
-  scene.bodies.push_back(features.body("faces", frames.faces));
-  scene.bodies.push_back(features.body("edges", frames.edges));
+  scene.bodies.push_back({"vertices", features.primitives(vertices), features.plans()});
+  add_body_over(scene, 0, "faces", features.primitives(frames.faces));
+  add_body_over(scene, 0, "edges", features.primitives(frames.edges));
   scene.pairs = {{0, 1}, {2, 2}};
   BoxCandidates found;
   std::set<Ids> touching[2];
