@@ -13,7 +13,7 @@ import synthetic
 from synthetic import line
 from test_advice import other
 
-from advice import advice, cells_file, summary
+from advice import advice, cells_file, kept_costs, summary
 from claims import claims
 from figures import time_error, time_error_file, time_error_panels
 from results.load import Study, load
@@ -163,6 +163,37 @@ class TestSentences(unittest.TestCase):
             self.assertRegex(says, r"project \(.*\), 10k to 100k triangles: With 10 frames a keyframe and more: refit, 2\.00 ms a frame \(20k triangles\); "
                              r"join if the next keyframe is known, 1\.00 ms a frame \(20k triangles\); 2\.00 times as fast as the refit .*; surely faster: .*\. 100k and more was not measured\.")  # fmt: skip
             self.assertEqual(summary.on_larger(advice.situations(advice.cells(self.study(sized(200000)))), folder), [])
+
+    def test_cells_that_come_with_the_project_are_told_line_by_line(self) -> None:
+        lines = []
+        for scene, refit, join in (("ball", 3.0, 2.0), ("cloth", 2.0, 1.0)):
+            lines += [line("refit", refit, scene), other("join", join, scene, foresight="next_keyframe")]
+        lines[-1]["times"]["disturbed"] = "9 involuntary switches"
+        with tempfile.TemporaryDirectory(prefix="kbvh-analysis-") as name:
+            folder = Path(name)
+            self.assertEqual(kept_costs.kept_lines(folder), [])
+            (folder / "cells.json").write_text(cells_file.content(cells_file.of_study(self.study(lines))), encoding="utf-8")
+            ball, cloth = sorted(kept_costs.kept_lines(folder), key=lambda one: one.scene)
+        self.assertEqual((ball.scene, ball.asks, ball.primitives, ball.l), ("ball", "", "4k", "10"))
+        self.assertEqual((ball.refit.title, ball.refit.ms, ball.refit.ratio), ("refit", "3.00", "the best refit"))
+        nothing, keyframe, clip = ball.advised
+        assert keyframe is not None
+        self.assertEqual((nothing, clip), (None, None), "the best refit, and what less knowledge takes, stand once")
+        self.assertEqual((keyframe.title, keyframe.ms), ("join", "2.00"))
+        self.assertTrue(keyframe.ratio.startswith("1.50"), keyframe.ratio)
+        assert cloth.advised[1] is not None
+        self.assertTrue(cloth.advised[1].ratio.startswith("2.00?"), "doubtful")
+
+    def test_self_collision_with_positions_only_is_said_to_be_unmeasured(self) -> None:
+        found = advice.situations(self.within())
+        with tempfile.TemporaryDirectory(prefix="kbvh-analysis-") as name:
+            folder = Path(name)
+            says = summary.on_others(found, folder)
+            self.assertIn("Pairs within a body with positions only (a keyframe at every frame), and above 4k triangles, were not measured in this study.", says)
+            self.assertIn("Refit uses no keyframes, so it can be taken with positions only, too; its time there is not known.", says)
+            self.assertNotIn("Nearest", says)
+            (folder / "cells.json").write_text(cells_file.content(cells_file.Cells([["p", "2026-01-02", "abc", "cpu"]], list(self.within()))), encoding="utf-8")
+            self.assertRegex(summary.on_others(found, folder), r"Nearest, by measurements that come with the project \(cpu, 2026-01-02; alone, 4k, l = 10\): 10 frames a keyframe and more: refit, 2\.00 ms")
 
     def within(self) -> list[advice.MeasuredCell]:
         lines = [line("refit", 2.0, "alone"), other("join", 1.0, "alone", foresight="next_keyframe")]

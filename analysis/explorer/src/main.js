@@ -167,7 +167,9 @@ function othersButton(count) {
 function besideLegend(parts) {
   const legend = parts.find((one) => one.classList.contains("legend") || one.classList.contains("legend-box"));
   if (!legend) return parts;
-  return [make("div", { class: "beside-legend" }, make("div", {}, parts.filter((one) => one !== legend)), legend)];
+  const top = parts.filter((one) => one.classList.contains("bargain")); // what the figures say, before the legend in a narrow window
+  const figures = parts.filter((one) => one !== legend && !top.includes(one));
+  return [...top, make("div", { class: "beside-legend" }, make("div", {}, figures), legend)];
 }
 
 function drawView() {

@@ -95,7 +95,7 @@ for (const which of ["reference", "merged"])
 
 await check("the report's top answers, and its links unfold what they lead to", async () => {
   const page = await open("reference", "", { file: "report", width: 1280 });
-  assert.deepEqual(await page.$$eval(".sentences a", (list) => list.map((one) => one.textContent)), [
+  assert.deepEqual(await page.$$eval(".sentences li > a", (list) => list.map((one) => one.textContent)), [
     "What to take",
     "Self-collision, rays",
     "Time against error",
@@ -104,6 +104,8 @@ await check("the report's top answers, and its links unfold what they lead to", 
   ]);
   const rule = expected.reference.situations.map(([, , , advice]) => [...new Set(advice.filter(Boolean).map(([id]) => id))].length);
   assert.equal((await page.$$(".situation:not(.scale)")).length, rule.reduce((a, b) => a + b));
+  await page.click('.sentences p a[href="#kept"]'); // the project's cells
+  await page.waitForFunction(() => document.querySelector("#kept").open && document.querySelectorAll("#kept tbody tr").length > 20);
   await page.click('.sentences a[href="#claims"]');
   await page.waitForFunction(() => document.querySelector("#claims").open);
   const claim = await load("reference", "#claim-E1", { file: "report" });
