@@ -21,8 +21,7 @@ COLOURS = """<style>
 .errors figcaption.title { display: none; }  /* the heading says it */
 .errors summary { cursor: pointer; }
 @media (max-width: 760px) { .errors .error-table { font-size: .7rem; } .errors .error-table :is(td, th) { padding: .25rem .2rem .25rem 0; }
-  .errors .error-table { table-layout: fixed; width: 100%; } .errors .error-table :is(td, th) { overflow-wrap: anywhere; }
-  .errors .error-table th:nth-child(1) { width: 5%; } .errors .error-table th:nth-child(2) { width: 33%; }
+  .errors .error-table td:nth-child(2) { overflow-wrap: anywhere; } .errors .error-table .tag { font-size: .65rem; }
   .errors .error-table .n { padding-left: .1rem; } }
 body[data-theme="dark"] .errors [style] { --paint: var(--d); }
 body[data-theme="light"] .errors [style] { --paint: var(--l); }
