@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/motion/curved_piece.hpp"
+#include "core/motion/flight_plans.hpp"
 #include "tests/support/rational_geometry.hpp"
 
 // Curves by rational arithmetic, from the definition in core/motion/curved_piece.hpp and nothing else of the
@@ -151,6 +152,20 @@ template <class S>
 Rational rational_value(const CurvedPiece<S>& p, const Rational& t) {
   const Rational s = (t - Rational(p.t0)) / (Rational(p.t1) - Rational(p.t0));
   return value(rational_difference(p, CurvedPiece<S>{p.t0, p.t1, 0, 0, 0, 0}), s);
+}
+
+/// Returns the coordinates [vertex][3] of a body at t.
+template <class S>
+std::vector<Rational> rational_values(const FlightPlans<S>& plans, double t) {
+  const auto times = plans.keyframe_times();
+  const std::size_t k = plans.segment_at(t);
+  std::vector<Rational> values;
+  for (std::uint32_t v = 0; v < plans.vertex_count(); ++v)
+    for (int axis = 0; axis < 3; ++axis)
+      values.push_back(t <= times[k] || k + 1 == times.size()
+                           ? Rational(double(plans.keyframe(k)[3 * v + std::uint32_t(axis)]))
+                           : rational_value(plans.curved_piece(v, axis, k), Rational(t)));
+  return values;
 }
 
 /// Returns each value's rank, ascending from 0; equal values have the same rank.

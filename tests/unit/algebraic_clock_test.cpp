@@ -89,15 +89,7 @@ class Play {
   Topologies at_start(const BuilderConfig& config) { return build_topologies(view_, playback_, config); }
   void check_realisers(double t) {
     for (std::uint32_t body = 0; body < forest_.size(); ++body) {
-      const FlightPlans<S>& plans = playback_.plans(body);
-      const auto times = plans.keyframe_times();
-      const std::size_t k = plans.segment_at(t);
-      std::vector<Rational> values;
-      for (std::uint32_t v = 0; v < plans.vertex_count(); ++v)
-        for (int axis = 0; axis < 3; ++axis)
-          values.push_back(t <= times[k] || k + 1 == times.size()
-                               ? Rational(double(plans.keyframe(k)[3 * v + std::uint32_t(axis)]))
-                               : rational_value(plans.curved_piece(v, axis, k), Rational(t)));
+      const std::vector<Rational> values = rational_values(playback_.plans(body), t);
       const auto& tree = forest_.tree(body);
       for (std::uint32_t node = 0; node < tree.topology().size(); ++node)
         for (Side side = 0; side < 6; ++side) {

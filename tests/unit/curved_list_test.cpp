@@ -25,20 +25,6 @@ namespace {
 using seeded_clock::Fault;
 using seeded_clock::Seeded;
 
-/// Returns the coordinates [vertex][3] of a body at t, from the definition.
-template <class S>
-std::vector<Rational> values_at(const FlightPlans<S>& plans, double t) {
-  const auto times = plans.keyframe_times();
-  const std::size_t k = plans.segment_at(t);
-  std::vector<Rational> values;
-  for (std::uint32_t v = 0; v < plans.vertex_count(); ++v)
-    for (int axis = 0; axis < 3; ++axis)
-      values.push_back(t <= times[k] || k + 1 == times.size()
-                           ? Rational(double(plans.keyframe(k)[3 * v + std::uint32_t(axis)]))
-                           : rational_value(plans.curved_piece(v, axis, k), Rational(t)));
-  return values;
-}
-
 /// The ranks of all coordinates at one time among those of all bodies on the same axis.
 struct Ranks {
   std::vector<std::uint32_t> rank[3];  ///< [axis][vertex of all bodies]
@@ -112,7 +98,7 @@ class Play {
     std::vector<Rational> all[3];
     for (std::uint32_t body = 0; body < view_.body_count(); ++body) {
       made.first_of.push_back(all[0].size());
-      const std::vector<Rational> values = values_at(playback_.plans(body), t);
+      const std::vector<Rational> values = rational_values(playback_.plans(body), t);
       for (std::size_t i = 0; i < values.size(); ++i) all[i % 3].push_back(values[i]);
     }
     for (std::size_t axis = 0; axis < 3; ++axis) made.rank[axis] = ranks(all[axis]);
