@@ -316,6 +316,25 @@ bool one_segment(const CurvedPiece<S>& a, const CurvedPiece<S>& b) {
   return a.t0 == b.t0 && a.t1 == b.t1;
 }
 
+bool is_point(const CurveRoot& root) {
+  return root.begin == root.end;
+}
+/// Returns whether the root is the beginning of the segment, as where curves start together.
+bool at_start(const CurveRoot& root) {
+  return root.end == 0;
+}
+
+/// Orders two roots of one segment by their intervals; no value where these do not tell.
+std::optional<int> order_of(const CurveRoot& p, const CurveRoot& q) {
+  if (p.end < q.begin) return -1;
+  if (q.end < p.begin) return 1;
+  if (is_point(p) && is_point(q)) return 0;
+  // An isolated root lies in the interior of its interval, unless that is a point.
+  if (p.isolated && q.isolated && p.end == q.begin) return -1;
+  if (p.isolated && q.isolated && q.end == p.begin) return 1;
+  return {};
+}
+
 }  // namespace
 
 template <class S>
@@ -338,6 +357,7 @@ SegmentRoots segment_roots(const CurvedPiece<S>& a, const CurvedPiece<S>& b, Cur
 
 template <class S>
 TimeEstimate moment_estimate(const CurvedPiece<S>& piece, const CurveRoot& root) {
+  if (at_start(root)) return {piece.t0, 0};
   const double duration = piece.t1 - piece.t0;
   const double time = piece.t0 + duration * (0.5 * (root.begin + root.end));
   // CurveDifference, sum, product and final sum each have at most one rounding error.
@@ -350,6 +370,7 @@ template <class S>
 int compare_at(const CurvedPiece<S>& a, const CurvedPiece<S>& b, double t) {
   KBVH_ASSERT(one_segment(a, b) && t >= a.t0 && t <= a.t1);
   const CurveDifference g = curve_difference(a, b);
+  if (g.size() == 0) return 0;
   if (t == a.t0) return sign_of(g.start.hi);
   if (t == a.t1) return sign_of(g.end.hi);
   const double s = (t - a.t0) / (a.t1 - a.t0), rest = 1 - s;
@@ -362,14 +383,13 @@ int compare_at(const CurvedPiece<S>& a, const CurvedPiece<S>& b, double t) {
 }
 
 template <class S>
-int compare_moments(const CurveMoment<S>& x, const CurveMoment<S>& y) {
+int compare_moments(const CurveMoment<S>& x, const CurveMoment<S>& y, CurveStats* stats) {
   if (one_segment(x.first, y.first)) {
     if (same_roots(curve_difference(x.first, x.second), curve_difference(y.first, y.second)))
       return (x.root > y.root) - (x.root < y.root);
     const SegmentRoots of_x = segment_roots(x.first, x.second), of_y = segment_roots(y.first, y.second);
-    const CurveRoot &p = of_x.roots[x.root], &q = of_y.roots[y.root];
-    if (p.end < q.begin) return -1;
-    if (q.end < p.begin) return 1;
+    if (const std::optional<int> order = order_of(of_x.roots[x.root], of_y.roots[y.root])) return *order;
+    if (stats != nullptr) ++stats->exact;
     return in_share(x).compare_to(in_share(y));
   }
   if (x.first.t1 <= y.first.t0) return -1;
@@ -386,6 +406,7 @@ int compare_moment_to(const CurveMoment<S>& x, double t) {
   if (t >= x.first.t1) return -1;
   const TimeEstimate estimate = estimate_of(x);
   const double apart = estimate.time - t;
+  if (estimate.error == 0) return sign_of(apart);
   if (std::fabs(apart) > estimate.error * (1 + 0x1p-40)) return sign_of(apart);
   return in_seconds(x).compare_to(DyadicTime{Dyadic(t)});
 }
@@ -409,6 +430,7 @@ int compare_at_moment(const CurvedPiece<S>& a, const CurvedPiece<S>& b, const Cu
   if (g.size() == 0 || same_roots(g, curve_difference(moment.first, moment.second))) return 0;
   const SegmentRoots known = segment_roots(moment.first, moment.second);
   const CurveRoot& root = known.roots[moment.root];
+  if (at_start(root)) return sign_of(g.start.hi);
   const double s = 0.5 * (root.begin + root.end), rest = 1 - s;
   const double value = g.start.hi * rest + g.end.hi * s + s * rest * (g.bend.hi + g.twist.hi * s);
   if (std::fabs(value) > (0x1p-48 + 4 * (root.end - root.begin)) * g.size() + kLeast) return sign_of(value);
@@ -421,6 +443,11 @@ int compare_after_moment(const CurvedPiece<S>& a, const CurvedPiece<S>& b, const
   if (curve_difference(a, b).size() == 0) return 0;
   if (same_roots(curve_difference(a, b), curve_difference(moment.first, moment.second)))
     return segment_roots(a, b).roots[moment.root].after;
+  // If both start together, the factor's first coefficient is the slope of their difference.
+  if (at_start(segment_roots(moment.first, moment.second).roots[moment.root])) {
+    const Factor h = factor(curve_difference(a, b));
+    if (const int sign = certain_sign(h.b[0], h.error)) return sign;
+  }
   return sign_after(Polynomial::from(exact_coefficients(a, b)), in_share(moment));
 }
 
@@ -428,7 +455,7 @@ int compare_after_moment(const CurvedPiece<S>& a, const CurvedPiece<S>& b, const
   template SegmentRoots segment_roots(const CurvedPiece<S>&, const CurvedPiece<S>&, CurveStats*);      \
   template TimeEstimate moment_estimate(const CurvedPiece<S>&, const CurveRoot&);                      \
   template int compare_at(const CurvedPiece<S>&, const CurvedPiece<S>&, double);                       \
-  template int compare_moments(const CurveMoment<S>&, const CurveMoment<S>&);                          \
+  template int compare_moments(const CurveMoment<S>&, const CurveMoment<S>&, CurveStats*);             \
   template int compare_moment_to(const CurveMoment<S>&, double);                                       \
   template int compare_moment_to(const CurveMoment<S>&, const Crossing<S>&);                           \
   template int compare_at_moment(const CurvedPiece<S>&, const CurvedPiece<S>&, const CurveMoment<S>&); \

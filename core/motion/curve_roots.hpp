@@ -12,7 +12,7 @@ namespace kbvh {
 // round_positions.hpp, times are finite. Two pieces that are compared have the same t0 and t1. No function
 // allocates before big integers.
 
-/// Counts searches for roots, and those that the filter left to big integers. Calls add to it.
+/// Counts searches for roots, and what the filter left to big integers. Calls add to it.
 struct CurveStats {
   std::uint64_t searches = 0, exact = 0;
 };
@@ -47,7 +47,7 @@ struct CurveMoment {
   bool operator==(const CurveMoment&) const = default;
 };
 
-/// Approximates the time of a root with a guaranteed error bound, in seconds.
+/// Approximates the time of a root with a guaranteed error bound, in seconds: 0 where the segment begins.
 template <class S>
 TimeEstimate moment_estimate(const CurvedPiece<S>& piece, const CurveRoot& root);
 
@@ -55,9 +55,10 @@ TimeEstimate moment_estimate(const CurvedPiece<S>& piece, const CurveRoot& root)
 template <class S>
 int compare_at(const CurvedPiece<S>& a, const CurvedPiece<S>& b, double t);
 
-/// Returns the sign of x - y. The segments may differ.
+/// Returns the sign of x - y. The segments may differ. Roots at the beginning of a segment, where many curves
+/// may start together, need no big integers.
 template <class S>
-int compare_moments(const CurveMoment<S>& x, const CurveMoment<S>& y);
+int compare_moments(const CurveMoment<S>& x, const CurveMoment<S>& y, CurveStats* stats = nullptr);
 
 /// Return the sign of x - t, and of x minus the time of a crossing of linear pieces.
 template <class S>

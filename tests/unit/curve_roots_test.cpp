@@ -285,13 +285,51 @@ TEST(CurveRoots, EqualRationalArithmeticOnAdversarialPairsOfDoubles) {
   check_adversarial<double>(1000, 4);
 }
 
+// A cloth that starts flat: all its vertices meet at one moment, and so do all events.
+template <class S>
+void check_common_start(std::uint64_t seed) {
+  Pairs<S> pairs(seed);
+  constexpr int starts_together = 4;
+  std::vector<KnownMoment<S>> at_start, later;
+  for (int i = 0; i < 60; ++i) {
+    const Pair<S> pair = pairs.random(starts_together);
+    const SegmentRoots found = segment_roots(pair.a, pair.b);
+    ASSERT_GT(found.count, 0);
+    EXPECT_EQ(found.roots[0].end, 0);
+    EXPECT_EQ(moment_estimate(pair.a, found.roots[0]).error, 0);
+    EXPECT_EQ(moment_estimate(pair.a, found.roots[0]).time, pair.a.t0);
+    for (std::uint32_t r = 0; r < std::uint32_t(found.count); ++r)
+      (r == 0 ? at_start : later).push_back({{pair.a, pair.b, r}, rational_difference(pair.a, pair.b)});
+  }
+  ASSERT_GT(later.size(), 20u);
+  CurveStats stats;
+  for (std::size_t i = 0; i + 1 < at_start.size(); ++i) {
+    check_order(at_start[i], at_start[i + 1]);
+    EXPECT_EQ(compare_moments(at_start[i].moment, at_start[i + 1].moment, &stats), 0);
+    EXPECT_EQ(compare_moment_to(at_start[i].moment, at_start[i].moment.first.t0), 0);
+  }
+  for (std::size_t i = 0; i < later.size(); ++i) {
+    EXPECT_EQ(compare_moments(at_start[i].moment, later[i].moment, &stats), -1);
+    EXPECT_EQ(compare_moments(later[i].moment, at_start[i].moment, &stats), 1);
+  }
+  EXPECT_EQ(stats.exact, 0u);
+}
+
+TEST(CurveRoots, ACommonStartNeedsNoBigIntegersInFloat) {
+  check_common_start<float>(7);
+}
+TEST(CurveRoots, ACommonStartNeedsNoBigIntegersInDouble) {
+  check_common_start<double>(8);
+}
+
 template <class S>
 void check_signs(std::uint64_t seed) {
   Pairs<S> pairs(seed);
   int zeros = 0;
-  for (int i = 0; i < 240 && !testing::Test::HasFailure(); ++i) {
+  for (int i = 0; i < 320 && !testing::Test::HasFailure(); ++i) {
     const Pair<S> pair = i % 2 == 0 ? pairs.random(i % 5) : pairs.adversarial(i % 10);
     Pair<S> other = i % 4 < 2 ? pairs.random(i % 5) : pair;
+    if (i % 8 == 0) other.b.x0 = other.a.x0;
     for (CurvedPiece<S>* piece : {&other.a, &other.b}) piece->t0 = pair.a.t0, piece->t1 = pair.a.t1;
     if (i % 4 == 3) other.a.twist = std::nextafter(other.a.twist, S(9));
     const RationalPolynomial p = rational_difference(pair.a, pair.b),
