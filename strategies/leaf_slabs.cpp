@@ -7,9 +7,9 @@
 // costs two thirds as much as the boxes of a leaf's triangles. Needs no foresight; bodies that are not made
 // of triangles are queried by boxes. It is a declared baseline: it refits, and knows nothing of the future.
 //
-// When it wins: with exact tests and without interpolation (l = 1). By plan `motion` (e1bc2ef, Intel Xeon,
-// float) it is 0.9 to 2.3 times as fast as `bottom_up`: most on a dancer's skirt and a recorded tablecloth,
-// least on a morph stress test, whose leaves are rough.
+// When it wins: with exact tests. By plan `motion` (a0efb8c, AMD EPYC, float, l = 1) it is 0.99 to 2.6 times
+// as fast as the best refit by boxes alone: most on a dancer's skirt and a recorded tablecloth, least on a
+// morph stress test, whose leaves are rough.
 #include "core/contract/registry.hpp"
 #include "core/families/slabs/slab_strategy.hpp"
 
