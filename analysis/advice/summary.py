@@ -16,7 +16,7 @@ from claims import claims as paper_claims
 from claims.claims import CONDITION, FAILS, HOLDS, OPEN, Claims
 from figures import time_error_file, time_error_panels
 from ratios import ratios
-from results import text
+from results import files, text
 from results.load import OLD_SCHEMA, Study
 from results.scene_names import short
 
@@ -99,8 +99,7 @@ def paper(claims: Claims, folder: Path, reference: Path = REFERENCE) -> Paper:
     file = reference / "claims.json"
     if file.exists() and folder.resolve() != reference.resolve():
         known = {one["id"]: one for one in json.loads(file.read_text(encoding="utf-8"))["claims"] if one["verdict"] != OPEN}
-        with (reference / "results.jsonl").open(encoding="utf-8") as lines:
-            first = json.loads(next(lines))
+        first = json.loads(files.read_packed(reference / "results.jsonl").split(b"\n", 1)[0])
         about = f"{first['machine']['cpu']}, {first['when'][:10]}, commit {first['commit'][:8]}"
     verdicts = []
     for row in claims.rows:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import errno
+import gzip
 import json
 import os
 import sys
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Union
@@ -31,6 +33,17 @@ def parse_json(content: str) -> Any:
 def read_json(file: Path) -> Any:
     """Returns the value of a JSON file, with or without a byte order mark. Raises OSError and ValueError."""
     return parse_json(file.read_bytes().decode("utf-8"))
+
+
+def read_packed(file: Path) -> bytes:
+    """Returns the content of a file, or that of `file`.gz if only this exists. Raises OSError."""
+    packed = file.with_name(file.name + ".gz")
+    if file.exists() or not packed.exists():
+        return file.read_bytes()
+    try:
+        return gzip.decompress(packed.read_bytes())
+    except (EOFError, zlib.error) as problem:
+        raise OSError(errno.EIO, f"it is damaged ({problem})", str(packed)) from problem
 
 
 def complaint(error: OSError) -> tuple[str, int]:

@@ -26,7 +26,7 @@ class Table:
 def tables(folder: Path) -> tuple[set[str], dict[tuple[str, ...], Table]]:
     """Returns the commits of a folder of results, and its tables. Raises ResultError."""
     study = load(folder)
-    lines = (folder / FILE_NAME).read_text(encoding="utf-8").split("\n")
+    lines = files.read_packed(folder / FILE_NAME).decode("utf-8").split("\n")
     asks = ["scene_name", "hash", "scalar", "l", "frames", "answer", "rays", "within", "held_to"]
     found = {}
     for asked, rows in study.runs.groupby(asks, sort=False, dropna=False):

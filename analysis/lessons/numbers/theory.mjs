@@ -4,6 +4,7 @@ import { mkdtempSync, readFileSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
+import { gunzipSync } from "node:zlib";
 
 const reference = join(dirname(dirname(dirname(fileURLToPath(import.meta.url)))), "reference");
 
@@ -99,8 +100,8 @@ const median = (values) => {
 
 /// Counts and times of the reference run: the tablecloth of 16k triangles at l = 10.
 function tablecloth(put) {
-  const source = "analysis/reference/results.jsonl";
-  const records = readFileSync(join(reference, "results.jsonl"), "utf8").trim().split("\n").map((line) => JSON.parse(line))
+  const source = "analysis/reference/results.jsonl.gz";
+  const records = gunzipSync(readFileSync(join(reference, "results.jsonl.gz"))).toString("utf8").trim().split("\n").map((line) => JSON.parse(line))
     .filter((record) => record.kind === "run" && record.study === "tablecloth" && record.scene.name.startsWith("tablecloth-16")
       && record.scene.per_keyframe === 10 && record.times?.repetitions);
   const labels = { refit: "bottom_up", period: "bottom_up_period", kinetic2006: "kinetic_aabb [queue=avl query=nodes width=2 leaf=1]",
