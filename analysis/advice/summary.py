@@ -79,7 +79,7 @@ class Verdict:
 class Paper:
     """What is known of the paper's claims, and of the reference run that stands in for what a study does not decide."""
 
-    verdicts: list[Verdict]
+    verdicts: list[Verdict]  #: E1 to E15, then T1 to T16, then C1 to C4
     reference: str  #: machine and day of the reference run; "" where it takes no part
 
     @property
@@ -103,7 +103,7 @@ def paper(claims: Claims, folder: Path, reference: Path = REFERENCE) -> Paper:
             first = json.loads(next(lines))
         about = f"{first['machine']['cpu']}, {first['when'][:10]}, commit {first['commit'][:8]}"
     verdicts = []
-    for row in claims.rows:
+    for row in sorted(claims.rows, key=lambda row: paper_claims.in_order(row.id)):
         one = known.get(row.id, {})
         verdicts.append(Verdict(row, one.get("verdict", ""), one.get("brief", ""), one.get("corners", []), one.get("ours", {})))
     return Paper(verdicts, about)

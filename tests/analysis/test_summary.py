@@ -57,6 +57,12 @@ class TestPaper(unittest.TestCase):
                       "Claim E3 (E3) holds with a condition (the reference run)."):  # fmt: skip
             self.assertIn(words, says)
 
+    def test_claims_stand_in_the_order_of_their_numbers(self) -> None:
+        ids = ["T2", "T10", "T1", "C1", "E10", "E3", "E1", "X1", ""]
+        verdicts = (claims.FAILS, claims.HOLDS, claims.CONDITION)
+        found = self.paper(*(row(id, verdicts[i % 3]) for i, id in enumerate(ids)))
+        self.assertEqual([one.row.id for one in found.verdicts], ["E1", "E3", "E10", "T1", "T2", "T10", "C1", "", "X1"])
+
     def test_the_main_claim_is_answered_before_its_verdict(self) -> None:
         known = {"2006:2006": ("0.037 to 3.35, 1 (with motion)", "met nowhere"), "best:2006": ("1.04 to 40.1", "met from l = 3 on"),
                  "best:best": ("0.0081 to 0.66", "met at 2 of 3 points (cloth 2k, l = 1; …)")}  # fmt: skip
