@@ -236,6 +236,7 @@ class Panel:
     """A drawn panel, and what it shows."""
 
     name: str  #: the key of its measure
+    title: str
     drawn: Markup
     says: str
 
@@ -251,6 +252,7 @@ class Shown:
     rows: list[dict[str, str]]  #: of the named points
     all_rows: list[dict[str, str]]
     slow: int  #: contestants at the right edge of the panels
+    exact: str = _paint(EXACT)  #: the colours of exact contestants, as a style
 
     @property
     def sentences(self) -> list[str]:
@@ -263,7 +265,7 @@ def shown(found: Sequence[Place]) -> list[Shown]:
     made = []
     for place in found:
         drawn = [
-            Panel(name, panel(place, name, looks), time_error.finding(place, name)) for name, measure in MEASURES.items()
+            Panel(name, measure.title, panel(place, name, looks), time_error.finding(place, name)) for name, measure in MEASURES.items()
             if any(math.isfinite(measure.of(one)) for one in place.points if not one.exact and one.missed + one.false > 0)
         ]  # fmt: skip
         made.append(

@@ -84,7 +84,16 @@ for (const which of ["reference", "merged"])
       assert.ok(statSync(expected[which].report).size < 2e6);
       const page = await open(which, "", { width, scheme, file: "report" });
       const tall = await page.evaluate(() => document.documentElement.scrollHeight);
-      if (width === 1280) assert.ok(tall <= 5 * 900, `${tall} pixels`);
+      // Five screens: of a desktop, and of a phone of 390 x 844.
+      assert.ok(tall <= 5 * (width === 1280 ? 900 : 844), `${tall} pixels`);
+      const folds = await page.$$eval(".fold", (list) =>
+        list.filter((one) => !one.parentElement.closest("details:not([open])")).map((one) => [one.open, one.querySelector("summary").offsetHeight > 0, one.querySelector("summary").textContent]),
+      );
+      assert.ok(folds.length > 2);
+      for (const [isOpen, named, title] of folds) {
+        assert.equal(isOpen, width === 1280, title);
+        assert.equal(named, width !== 1280 && title !== "", title);
+      }
       assert.deepEqual(await beyond(page), []);
       const contrast = await page.evaluate(() => getComputedStyle(document.documentElement).color);
       assert.equal(contrast === "rgb(29, 33, 41)", scheme === "light");
