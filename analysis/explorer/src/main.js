@@ -207,9 +207,9 @@ function mixture() {
   return make(
     "p",
     { class: "lead mixture" },
-    "All situations of these results are mixed here: sizes, frames a keyframe, pairs of two bodies and within one, and what is known of the future. For one of them, ",
+    "This view mixes all situations of these results: sizes, frames a keyframe, pairs of two bodies and within one, and what is known of the future. For a single situation, ",
     make("button", { type: "button", class: "quiet", text: "see the answer", click: () => set({ view: "answer" }) }),
-    " or filter.",
+    " or use the filters.",
   );
 }
 
@@ -384,7 +384,7 @@ function build() {
   document.head.append(
     make("style", {
       class: "contestants",
-      text: `:root{${paints(model.contestants, "light")}}:root[data-scheme=dark]{${paints(model.contestants, "dark")}}`,
+      text: `:root{${paints(model.contestants, "light")}}@media screen{:root[data-scheme=dark]{${paints(model.contestants, "dark")}}}`,
     }),
   );
   host.open = make("button", {
