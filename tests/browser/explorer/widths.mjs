@@ -143,7 +143,8 @@ await check("what a phone folds unfolds by a tap, in a wide window and on paper"
 });
 
 await check("on paper the explorer's dark scheme is light", async () => {
-  const page = await load("reference", "", { scheme: "dark" });
+  const page = await load("reference");
+  await page.click("#theme");
   const ink = () => page.evaluate(() => getComputedStyle(document.documentElement).color);
   assert.equal(await ink(), "rgb(230, 232, 236)");
   await page.emulateMediaType("print");
