@@ -334,7 +334,8 @@ def sentences(study: Study, found: Sequence[Situation], errors: Sequence[time_er
     place = next((anchor for asks, anchor in advice.ANCHORS.items() if any(one.asks == asks for one in found)), "kept" if kept_cells() else "limits")
     new = [one for situation in found if situation.asks in advice.ANCHORS for one in advice.recommended(situation) if one not in told]
     others = [part for part in [*parts_on_others(found), methods.explained(new)] if part]
-    said.append(Sentence("Self-collision, rays", others, place, rest="What else is known, and what was not measured"))
+    answers = min(2, len({one.asks for one in found if one.asks != advice.PAIRS}))  # as many as parts_on_others begins with
+    said.append(Sentence("Self-collision, rays", others, place, first=max(1, answers), rest="What else is known, and what was not measured"))
     bought = errors[0].sentences if errors else [on_errors(errors)]
     said.append(Sentence("Time against error", bought, "errors" if errors else "limits", rest="If the future is known"))
     said.append(Sentence("The paper", parts_on_the_paper(known), "claims", first=2))

@@ -66,7 +66,7 @@ class Label:
     mark: Spot
     width: float
     height: float
-    needed: bool  #: crosses lines of the figure rather than not to be there
+    needed: bool  #: may cross lines of the figure where there is no other room
 
 
 @dataclass(frozen=True)

@@ -191,7 +191,7 @@ def _labels(
     place: Place, front: Sequence[Point], share: Callable[[Point], float], at: dict[int, Spot], drawn: Sequence[Segment], looks: dict[str, tuple[str, str]]
 ) -> list[str]:
     """Writes the numbers of the front, then the values at both ends of each dial in the dial's colour, next to their marks. Labels cover
-    neither marks nor each other (`label_places`); a number crosses a line rather than to be absent, a value without room is left out.
+    neither marks nor each other (`label_places`). A number may cross a line; a value without room is left out.
     """
     wanted = [(one, one.mark, "number") for one in front if one.mark]
     slow = place.slow
