@@ -156,9 +156,12 @@ def panel(place: Place, name: str, looks: dict[str, tuple[str, str]]) -> Markup:
         made.append(f'<path class="front" d="M{" L".join(f"{x:.1f} {y:.1f}" for x, y in corners)}"/>')
         drawn += zip(corners, corners[1:])
     for curve in place.curves:
-        way = [at[id(one)] for one in curve.points if id(one) in at]
-        made.append(f'<polyline class="dial" style="{_paint(looks[curve.id][0])}" points="{" ".join(f"{x:.1f},{y:.1f}" for x, y in way)}"/>')
-        drawn += zip(way, way[1:])
+        known = [one for one in curve.points if id(one) in at]
+        steps = [(at[id(one)], at[id(other)]) for one, other in zip(known, known[1:]) if max(share(one), share(other)) > 0]  # none along the strip
+        if steps:
+            way = "".join(f"M{x0:.1f} {y0:.1f}L{x1:.1f} {y1:.1f}" for (x0, y0), (x1, y1) in steps)
+            made.append(f'<path class="dial" style="{_paint(looks[curve.id][0])}" d="{way}"/>')
+            drawn += steps
     for one in sorted(points, key=lambda one: (bool(one.mark), not one.exact)):
         made.append(_drawn(one, measure, *at[id(one)], looks))
     made += _labels(place, front, share, at, drawn, looks)

@@ -177,6 +177,16 @@ class TestTimeError(unittest.TestCase):
         said = {word.replace("\u00a0", " ") for word in re.findall('class="value"[^>]*>([^<]*)<', shown.panels[0].drawn)}
         self.assertTrue({"every 8", "300"} <= said <= {"every 2", "every 8", "margin 0", "margin 0.5", "300", "900"}, said)
 
+    def test_curves_are_drawn_where_there_is_an_error(self) -> None:
+        lines = [exact("refit", 2.0), *(wrong("stale", total, missed, refit_every=every) for every, total, missed in ((2, 1.6, 0), (3, 1.5, 0), (8, 1.2, 100)))]
+        (shown,) = time_error_panels.shown(time_error.places(self.study(lines)))
+        drawn = {panel.name: re.findall(r'class="dial"[^>]* d="([^"]*)"', panel.drawn) for panel in shown.panels}
+        self.assertEqual([way.count("M") for way in drawn["missed"]], [1], "from 3 to 8, and not along the strip from 2 to 3")
+        self.assertEqual(drawn["false"], [])
+        marks = dict(re.findall(r'translate\(([\d.]+) ([\d.]+)', shown.panels[0].drawn))
+        (begin, end) = re.findall(r"([\d.]+) ([\d.]+)", drawn["missed"][0])
+        self.assertEqual([marks[x] for x, _ in (begin, end)], [y for _, y in (begin, end)], "from mark to mark")
+
     def test_contestants_without_an_error_stand_side_by_side_or_above_each_other(self) -> None:
         crowd = [exact(f"tree_{i}", 2.0 + i / 40) for i in range(24)]
         for lines in ([*crowd, wrong("a", 1.0, 500), wrong("b", 9.0, 1)], [exact("refit", 2.0), wrong("a", 1.0, 500)]):
