@@ -79,7 +79,7 @@ class Verdict:
 class Paper:
     """What is known of the paper's claims, and of the reference run that stands in for what a study does not decide."""
 
-    verdicts: list[Verdict]
+    verdicts: list[Verdict]  #: E1 to E15, then T1 to T16, then C1 to C4
     reference: str  #: machine and day of the reference run; "" where it takes no part
 
     @property
@@ -102,7 +102,7 @@ def paper(claims: Claims, folder: Path, reference: Path = REFERENCE) -> Paper:
         first = json.loads(files.read_packed(reference / "results.jsonl").split(b"\n", 1)[0])
         about = f"{first['machine']['cpu']}, {first['when'][:10]}, commit {first['commit'][:8]}"
     verdicts = []
-    for row in claims.rows:
+    for row in sorted(claims.rows, key=lambda row: paper_claims.in_order(row.id)):
         one = known.get(row.id, {})
         verdicts.append(Verdict(row, one.get("verdict", ""), one.get("brief", ""), one.get("corners", []), one.get("ours", {})))
     return Paper(verdicts, about)
@@ -125,13 +125,12 @@ def on_the_main_claim(one: Verdict) -> str:
     for id, refit, tree, _ in ASKED:
         if id in known:
             answers.setdefault(refit, []).append(f"{answer(known[id][0])}{f' {tree}' if tree else ''} ({known[id][0]} times as fast)")
-    by = "this study" if one.source == HERE else f"{one.source}"
-    claim = f"{one.row.claim} ({MAIN})"
+    claim = f"The claim “{one.row.claim}” ({MAIN}) {one.verdict}, by {one.source}."
     if not answers:
-        return f"{claim} {one.verdict} ({by})."
+        return claim
     said = ". ".join(f"{refit}: {', '.join(parts)}" for refit, parts in answers.items())
-    where = "; ".join(f"{name} {_plain(known[id][1])}" for id, _, _, name in ASKED if id in known and known[id][1])
-    return f"Is updating a kinetic AABB tree faster than a bottom-up refit? {said}.{_on_others(one)} {claim} {one.verdict}{f': {where}' if where else ''} ({by})."
+    where = "".join(f" {name[0].upper()}{name[1:]}: {_plain(known[id][1])}." for id, _, _, name in ASKED if id in known and known[id][1])
+    return f"Is updating a kinetic AABB tree faster than a bottom-up refit? {said}.{_on_others(one)} {claim}{where}"
 
 
 def _on_others(one: Verdict) -> str:
@@ -208,6 +207,8 @@ class Sentence:
     parts: list[str]
     place: str
     more: Optional[tuple[str, str]] = None  #: id and title of a part with more, which the page links after the sentences
+    first: int = 1  #: so many of the sentences answer the question; a phone folds the rest
+    rest: str = "More"  #: what the rest is about
 
     @property
     def says(self) -> str:
@@ -326,12 +327,17 @@ def sentences(study: Study, found: Sequence[Situation], errors: Sequence[time_er
         ends = _ends(pairs)
         told = [one for situation in [*ends, *larger(found)] for one in advice.recommended(situation)]
         parts = [*(advice.sentence(one) for one in ends), *on_larger(found), methods.explained(told)]
-        said.append(Sentence("What to take", [part for part in parts if part], "glance", ("kept", "The project's measurements, scene by scene")))
+        kept = ("kept", "The project's measurements, scene by scene")
+        rest = "Larger scenes, and what these strategies do"
+        said.append(Sentence("What to take", [part for part in parts if part], "glance", kept, len(ends), rest))
     place = next((anchor for asks, anchor in advice.ANCHORS.items() if any(one.asks == asks for one in found)), "kept" if kept_cells() else "limits")
     new = [one for situation in found if situation.asks in advice.ANCHORS for one in advice.recommended(situation) if one not in told]
-    said.append(Sentence("Self-collision, rays", [part for part in [*parts_on_others(found), methods.explained(new)] if part], place))
-    said.append(Sentence("Time against error", errors[0].sentences if errors else [on_errors(errors)], "errors" if errors else "limits"))
-    said.append(Sentence("The paper", parts_on_the_paper(known), "claims"))
+    others = [part for part in [*parts_on_others(found), methods.explained(new)] if part]
+    answers = min(2, len({one.asks for one in found if one.asks != advice.PAIRS}))  # as many as parts_on_others begins with
+    said.append(Sentence("Self-collision, rays", others, place, first=max(1, answers), rest="What else is known, and what was not measured"))
+    bought = errors[0].sentences if errors else [on_errors(errors)]
+    said.append(Sentence("Time against error", bought, "errors" if errors else "limits", rest="If the future is known"))
+    said.append(Sentence("The paper", parts_on_the_paper(known), "claims", first=2))
     said.append(Sentence("This run", [on_disturbance(study)], "limits"))
     return said
 

@@ -105,6 +105,12 @@ def evaluate(study: Study, folder: Path, file: Path = FILE) -> Claims:
     return Claims(rows, said["baselines"])
 
 
+def in_order(id: str) -> tuple[int, int, str]:
+    """Returns the place of a claim in lists for readers, as a sort key: experiments (E), theory (T), the paper's conclusions (C), each by number."""
+    kind, number = id[:1], id[1:]
+    return "ETC".index(kind) if kind and kind in "ETC" else 3, int(number) if number.isdecimal() else 0, id
+
+
 def theory_rows(listed: list[dict[str, Any]], folder: Path) -> list[Row]:
     """Takes the claims of theory.json with their verdicts; undecided if the file is missing."""
     path = folder / "theory.json"

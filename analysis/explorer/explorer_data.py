@@ -292,13 +292,12 @@ def _reconstructed(row: pd.Series) -> dict[str, Any]:
 
 
 def _claims(known: Optional[summary.Paper]) -> list[dict[str, Any]]:
-    """Returns the claims of the paper, experiments first, each with its verdict, whose it is, its ranges and its picture of these results."""
+    """Returns the claims of the paper, in the order of their numbers, each with its verdict, whose it is, its ranges and its picture of these results."""
     if known is None:
         return []
-    found = [
+    return [
         {"id": one.row.id, "claim": one.row.claim, "paper": one.row.paper, "verdict": one.verdict, "source": one.source, "brief": one.brief,
          "corners": paper_claims.ranges_of_corners(one.corners, one.ours),
          "picture": str(claim_pictures.picture(one.row.looked, one.row.checks)) if one.source == summary.HERE else ""}
         for one in known.verdicts if one.source
     ]  # fmt: skip
-    return sorted(found, key=lambda one: not one["id"].startswith("E"))

@@ -12,8 +12,9 @@ from typing import Optional
 from markupsafe import Markup
 
 from claims.claim_pictures import ticks
-from figures import time_error
+from figures import label_places, time_error
 from figures.colours import Look, on_dark, symbol
+from figures.label_places import Box, Label, Segment, Spot, around, stacked
 from figures.time_error import MEASURES, Measure, Place, Point, short
 from results import text
 
@@ -61,13 +62,16 @@ def _symbol(colour: str, marker: str) -> Markup:
 WIDTH, HEIGHT = 420, 348
 LEFT, RIGHT, TOP, BOTTOM = 60, 10, 44, 40  #: names of the vertical lines stand above the top, where no mark is
 HEAD = 16  #: room for a label above the largest share
-STRIP = 20  #: height of the strip of exact zeros
-FONT = 6.4  #: width of a character, for labels that keep apart
+STRIP = 20  #: height of the strip of exact zeros, with one row of marks
+ROW = 9.5  #: between two rows of the strip, and between two marks in a row: marks do not touch
+ROWS = 10  #: at most; beyond, marks cover each other
+WIDTHS = {"number": 8.2, "value": 6.4}  #: of a character, for labels that keep apart
+NAME = 6.4  #: width of a character of the vertical lines' names
 GAP = 4  #: between two labels on a line
 
 
 class Scale:
-    """Places of times (logarithmic) and shares (logarithmic, zero apart)."""
+    """Places of times (logarithmic) and shares (logarithmic; zero apart, in a strip of `rows` rows)."""
 
     def __init__(self, times: Sequence[float], shares: Sequence[float]) -> None:
         low, high = math.log10(min(times)), math.log10(max(times))
@@ -77,16 +81,23 @@ class Scale:
         self.least = math.floor(math.log10(min(positive)) + 1e-9)
         self.most = max(math.ceil(math.log10(max(positive)) - 1e-9), self.least + 1)
         self.times = ticks(10**self.low, 10**self.high, 5)
+        self.rows = 1
+
+    @property
+    def strip(self) -> float:
+        """Returns the height of the strip of zeros."""
+        return STRIP + ROW * (self.rows - 1)
 
     def x(self, time: float) -> float:
         """Returns the place of a time; those of slow contestants are at the edge."""
         return LEFT + min((math.log10(time) - self.low) / (self.high - self.low), 1.0) * (WIDTH - LEFT - RIGHT)
 
-    def y(self, share: float) -> float:
+    def y(self, share: float, row: int = 0) -> float:
+        """Returns the place of a share; that of zero is in a row of the strip, from the lowest one on."""
         bottom = HEIGHT - BOTTOM
         if share <= 0:
-            return bottom - STRIP / 2
-        bottom -= STRIP + 4
+            return bottom - STRIP / 2 - ROW * row
+        bottom -= self.strip + 4
         return bottom - (math.log10(share) - self.least) / (self.most - self.least) * (bottom - TOP - HEAD)
 
     def decades(self) -> list[float]:
@@ -101,10 +112,17 @@ def panel(place: Place, name: str, looks: dict[str, tuple[str, str]]) -> Markup:
     points = [one for one in place.points if math.isfinite(share(one))]
     slow = place.slow
     scale = Scale([one.time for one in place.points if one not in slow], [share(one) for one in points])
+    zeros = [one for one in points if share(one) <= 0]
+    rows = stacked([scale.x(one.time) for one in zeros], ROW, ROWS)
+    scale.rows = 1 + max(rows, default=0)
+    row_of = {id(one): row for one, row in zip(zeros, rows)}
+    at = {id(one): (scale.x(one.time), scale.y(share(one), row_of.get(id(one), 0))) for one in points}
     bottom, right = HEIGHT - BOTTOM, WIDTH - RIGHT
     made = [f'<text class="head" x="0" y="13">{escape(measure.title)}</text>',
-            f'<rect class="strip" x="{LEFT}" y="{bottom - STRIP}" width="{right - LEFT}" height="{STRIP}"/>',
+            f'<rect class="strip" x="{LEFT}" y="{bottom - scale.strip:.1f}" width="{right - LEFT}" height="{scale.strip:.1f}"/>',
             f'<text class="tick end" x="{LEFT - 5}" y="{bottom - STRIP / 2 + 4:.1f}">{measure.none}</text>']  # fmt: skip
+    if scale.rows > 1:  # a crowd: its number is easier to read than to count
+        made.append(f'<text class="tick end" x="{LEFT - 5}" y="{bottom - STRIP / 2 - 8:.1f}">({len(zeros)})</text>')
     for value in scale.decades():
         y = scale.y(value)
         made.append(f'<line class="grid" x1="{LEFT}" x2="{right}" y1="{y:.1f}" y2="{y:.1f}"/>')
@@ -119,25 +137,34 @@ def panel(place: Place, name: str, looks: dict[str, tuple[str, str]]) -> Markup:
         x = scale.x(exact.time)
         made.append(f'<rect class="slower" x="{x:.1f}" y="{TOP}" width="{right - x:.1f}" height="{bottom - TOP}"/>')
     lines = [(exact, "fastest exact", "beat", 15)] + [(place.unknowing, "no foresight", "beat unknowing", 3)] * (place.unknowing is not exact)
+    drawn: list[Segment] = []  # labels keep off them
     for one, word, kind, up in lines:  # the line further right begins below the name of the other
         if one is None:
             continue
         x = scale.x(one.time)
-        end = x + 4 + 0.95 * FONT * len(word) > right
+        end = x + 4 + 0.95 * NAME * len(word) > right
         made.append(f'<line class="{kind}" x1="{x:.1f}" x2="{x:.1f}" y1="{TOP - up - 8}" y2="{bottom}"/>')
         made.append(f'<text class="tick{" end" if end else ""}" x="{x + (-4 if end else 4):.1f}" y="{TOP - up}">{word}</text>')
-    front = place.fronts[name]
+        drawn.append(((x, TOP), (x, bottom)))
+    front = [one for one in place.fronts[name] if id(one) in at]
     if front:
-        way = f"M{scale.x(front[0].time):.1f} {TOP}"
+        corners = [(at[id(front[0])][0], float(TOP))]
         for one in front:
-            way += f"H{scale.x(one.time):.1f}V{scale.y(share(one)):.1f}"
-        made.append(f'<path class="front" d="{way}H{right}"/>')
+            x, y = at[id(one)]
+            corners += [(x, corners[-1][1]), (x, y)]
+        corners.append((float(right), corners[-1][1]))
+        made.append(f'<path class="front" d="M{" L".join(f"{x:.1f} {y:.1f}" for x, y in corners)}"/>')
+        drawn += zip(corners, corners[1:])
     for curve in place.curves:
-        way = " ".join(f"{scale.x(one.time):.1f},{scale.y(share(one)):.1f}" for one in curve.points if math.isfinite(share(one)))
-        made.append(f'<polyline class="dial" style="{_paint(looks[curve.id][0])}" points="{way}"/>')
+        known = [one for one in curve.points if id(one) in at]
+        steps = [(at[id(one)], at[id(other)]) for one, other in zip(known, known[1:]) if max(share(one), share(other)) > 0]  # none along the strip
+        if steps:
+            way = "".join(f"M{x0:.1f} {y0:.1f}L{x1:.1f} {y1:.1f}" for (x0, y0), (x1, y1) in steps)
+            made.append(f'<path class="dial" style="{_paint(looks[curve.id][0])}" d="{way}"/>')
+            drawn += steps
     for one in sorted(points, key=lambda one: (bool(one.mark), not one.exact)):
-        made.append(_drawn(one, measure, scale.x(one.time), scale.y(share(one)), looks))
-    made += _labels(place, points, front, scale, share, looks)
+        made.append(_drawn(one, measure, *at[id(one)], looks))
+    made += _labels(place, front, share, at, drawn, looks)
     return Markup(
         f'<svg class="time-error" role="img" viewBox="0 0 {WIDTH} {HEIGHT}" aria-label="{escape(_said(place, front, measure), quote=True)}">'
         + "".join(made) + "</svg>"
@@ -164,59 +191,42 @@ def _mark(colour: str, marker: str, x: float, y: float, says: str = "", scale: f
 
 
 def _labels(
-    place: Place, points: Sequence[Point], front: Sequence[Point], scale: Scale, share: Callable[[Point], float], looks: dict[str, tuple[str, str]]
+    place: Place, front: Sequence[Point], share: Callable[[Point], float], at: dict[int, Spot], drawn: Sequence[Segment], looks: dict[str, tuple[str, str]]
 ) -> list[str]:
     """Writes the numbers of the front, then the values at both ends of each dial in the dial's colour, next to their marks. Labels cover
-    neither marks nor each other, values no dial, and two on a line have a gap between them; values without room are left out, numbers are
-    led further away.
+    neither marks nor each other (`label_places`). A number may cross a line; a value without room is left out.
     """
-    taken = [(scale.x(one.time), scale.y(share(one)), 5.0, 4.0) for one in points]
-    along = [spot for curve in place.curves for spot in _along([(scale.x(one.time), scale.y(share(one))) for one in curve.points if math.isfinite(share(one))])]
     wanted = [(one, one.mark, "number") for one in front if one.mark]
-    ends = [(curve.points[i], short(float(curve.points[i].settings[curve.dial])), "value") for curve in place.curves for i in (0, -1)]
     slow = place.slow
-    wanted += [(one, word, kind) for one, word, kind in ends if one not in slow and share(one) > 0]
-    made, written = [], set()
-    for one, word, kind in wanted:
-        if (id(one), word, kind) in written:
+    for one, word in _ends(place):
+        told = any(other is one and (said, kind) == (word, "value") for other, said, kind in wanted)
+        if one not in slow and id(one) in at and share(one) > 0 and not told:
+            wanted.append((one, word, "value"))
+    labels = [Label(at[id(one)], WIDTHS[kind] * len(word) + 2, 10.0, kind == "number") for one, word, kind in wanted]
+    room = Box(LEFT, TOP, WIDTH - RIGHT, HEIGHT - BOTTOM)
+    made = []
+    for (one, word, kind), found in zip(wanted, label_places.place(labels, [around(spot, 10, 9) for spot in at.values()], drawn, room, GAP)):
+        if found is None:
             continue
-        written.add((id(one), word, kind))
-        x, y, half = scale.x(one.time), scale.y(share(one)), FONT * len(word) / 2 + 1
-        reaches = (10, 14, 19, 25, 33)
-        spot = _free(x, y, half, taken + along, reaches) or (_free(x, y, half, taken, (*reaches, 42, 52, 63, 75, 90)) if kind == "number" else None)
-        if spot is None:
-            continue
-        dx, dy = spot
-        taken.append((x + dx, y + dy, half + GAP, 6.0))
-        if math.hypot(dx, dy) > 19:
-            made.append(f'<line class="lead" x1="{x:.1f}" y1="{y:.1f}" x2="{x + dx * 0.7:.1f}" y2="{y + dy * 0.7:.1f}"/>')
+        if found.lead:
+            (x0, y0), (x1, y1) = found.lead
+            edge = 5 / math.hypot(x1 - x0, y1 - y0)  # of the mark, as a share of the way
+            made.append(f'<line class="lead" x1="{x0 + edge * (x1 - x0):.1f}" y1="{y0 + edge * (y1 - y0):.1f}" x2="{x1:.1f}" y2="{y1:.1f}"/>')
         paint = f' style="{_paint(looks[one.id][0])}"' if kind == "value" else ""
-        made.append(f'<text class="{kind}"{paint} x="{x + dx:.1f}" y="{y + dy + 4:.1f}">{word}</text>')
+        made.append(f'<text class="{kind}"{paint} x="{found.middle[0]:.1f}" y="{found.middle[1] + 4:.1f}">{escape(word)}</text>')
     return made
 
 
-def _along(way: Sequence[tuple[float, float]]) -> list[tuple[float, float, float, float]]:
-    """Returns spots on a polyline, 6 apart."""
+def _ends(place: Place) -> list[tuple[Point, str]]:
+    """Returns the ends of the curves with their values; with the dial's last word before it where a strategy turns several dials."""
+    dials: dict[str, set[str]] = {}
+    for curve in place.curves:
+        dials.setdefault(curve.id, set()).add(curve.dial)
     found = []
-    for (x0, y0), (x1, y1) in zip(way, way[1:]):
-        steps = math.ceil(math.hypot(x1 - x0, y1 - y0) / 6) or 1
-        found += [(x0 + (x1 - x0) * i / steps, y0 + (y1 - y0) * i / steps, 1.0, 0.0) for i in range(1, steps)]
+    for curve in place.curves:
+        name = curve.dial.replace("_", " ").split(" ")[-1] + "\u00a0" if len(dials[curve.id]) > 1 else ""
+        found += [(one, name + short(float(one.settings[curve.dial]))) for one in (curve.points[0], curve.points[-1])]
     return found
-
-
-def _free(
-    x: float, y: float, half: float, taken: Sequence[tuple[float, float, float, float]], reaches: Sequence[int]
-) -> Optional[tuple[float, float]]:
-    """Returns where, relative to (x, y), a label of this half width is inside the panel and free of what is taken; None without room."""
-    for reach in reaches:
-        for angle in (135, 180, 225, 90, 270, 45, 315, 0):
-            along = math.cos(math.radians(angle))
-            dx = reach * along + math.copysign(half - 3, along) * (abs(along) > 0.1)
-            dy = reach * math.sin(math.radians(angle))
-            inside = LEFT < x + dx - half and x + dx + half < WIDTH - RIGHT and TOP < y + dy - 5 and y + dy + 5 < HEIGHT - BOTTOM
-            if inside and not any(abs(x + dx - cx) < half + w and abs(y + dy - cy) < 5 + h for cx, cy, w, h in taken):
-                return dx, dy
-    return None
 
 
 def _said(place: Place, front: Sequence[Point], measure: Measure) -> str:
@@ -229,6 +239,7 @@ class Panel:
     """A drawn panel, and what it shows."""
 
     name: str  #: the key of its measure
+    title: str
     drawn: Markup
     says: str
 
@@ -244,6 +255,7 @@ class Shown:
     rows: list[dict[str, str]]  #: of the named points
     all_rows: list[dict[str, str]]
     slow: int  #: contestants at the right edge of the panels
+    exact: str = _paint(EXACT)  #: the colours of exact contestants, as a style
 
     @property
     def sentences(self) -> list[str]:
@@ -256,7 +268,7 @@ def shown(found: Sequence[Place]) -> list[Shown]:
     made = []
     for place in found:
         drawn = [
-            Panel(name, panel(place, name, looks), time_error.finding(place, name)) for name, measure in MEASURES.items()
+            Panel(name, measure.title, panel(place, name, looks), time_error.finding(place, name)) for name, measure in MEASURES.items()
             if any(math.isfinite(measure.of(one)) for one in place.points if not one.exact and one.missed + one.false > 0)
         ]  # fmt: skip
         made.append(

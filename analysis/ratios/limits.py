@@ -55,8 +55,8 @@ def _origin(runs: pd.DataFrame) -> tuple[str, str]:
     words = []
     if len(commits) > 1:
         words.append(
-            f"The results come from {len(commits)} commits ({text.listing([c[:10] for c in commits])}); ratios are only made "
-            "inside one."
+            f"The results come from {len(commits)} commits ({text.listing([c[:10] for c in commits])}); each ratio is of two "
+            "runs of one commit."
         )
     dirty = int(runs["dirty"].sum())
     if dirty:
@@ -95,7 +95,7 @@ def _extent(runs: pd.DataFrame) -> tuple[str, str]:
     scalars = sorted(runs["scalar"].unique())
     words = [
         f"{text.plural(runs['scene'].nunique(), 'scene')} with {sizes} primitives, l = "
-        f"{text.listing([f'{value:g}' for value in depths])}, in {text.listing(scalars)}: lines are not valid outside these "
+        f"{text.listing([f'{value:g}' for value in depths])}, in {text.listing(scalars)}: nothing is known outside of these "
         "values."
     ]
     shorter = runs[runs["frames"] < 100]

@@ -176,8 +176,8 @@ def _break_even(
     reading = (
         "A bar begins at the l from which on a strategy is faster than a baseline, and ends at the largest measured l. Sizes count the moving body only. An open arrow "
         "marks the largest measured l of a strategy that is slower at every measured l: its break-even point is unknown. Between measured l "
-        "the ratio is interpolated on logarithmic axes, outside them nothing is. A name has only the setting that tells it from the others "
-        "of its strategy."
+        "the ratio is interpolated on logarithmic axes; nothing is extrapolated. Names have only the settings in which contestants of a strategy "
+        "differ."
     )
     return picture(
         folder, "break-even", "From which l on kinetic contestants are faster", reading,

@@ -124,14 +124,14 @@ def _group_pictures(
         picture(
             folder, f"{slug}-quality", f"Does the tree age? {place}",
             "A level line is a tree that suits the last frame of the clip as well as its first; a rising line is a structure "
-            "that the motion has degraded. The cost is that of a random query by the surface-area heuristic, over that of a "
-            "tree built with this heuristic at that time (1), so a line that starts above 1 has fuller leaves, or was split "
-            "at medians, from the start." + fastest_only,
+            "that the motion has degraded. The cost is what the surface-area heuristic expects of a random query, divided by the "
+            "same for a tree that is built with this heuristic at that time. A line that starts above 1 is a tree with fuller leaves, "
+            "or one that was split at medians." + fastest_only,
             lambda: tree_figures.over_time(group, all_looks), embedded=False,
         ),
         picture(
             folder, f"{slug}-pace", f"Does the query slow down? {place}",
-            "Mean times of equal parts of the clip. A rising line is a tree whose age costs time, or a clip with more to find."
+            "Mean times of equal parts of the clip. A line rises where an aging tree costs time, or where there is more to find."
             + fastest_only,
             lambda: tree_figures.times_over_time(group, all_looks), embedded=False,
         ),
@@ -145,8 +145,8 @@ def _group_pictures(
         ),
         picture(
             folder, f"{slug}-memory", f"Memory: {place}",
-            "The memory of a strategy's own structures after the clip, without the shared meshes and their motion. Left "
-            "and low is small and fast; a strategy to the right of another is worth its memory only if it lies below."
+            "The memory of a strategy's own structures after the clip, without the shared meshes and their motion. Further "
+            "left is smaller, further down is faster; a strategy to the right of another is worth its memory only if it lies below."
             + fastest_only,
             lambda: figures.memory(group, all_looks), embedded=False,
         ),

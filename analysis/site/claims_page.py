@@ -6,6 +6,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+from claims.claims import in_order
+
 #: The order of verdicts; others come last.
 ORDER = ["holds", "holds with a condition", "does not hold", "not decided here"]
 
@@ -15,12 +17,12 @@ def page(results: Path) -> str:
     lines = ["# Claims of the paper", ""]
     if not file.exists():
         return "\n".join([*lines, f"There is no `claims.json` in `{results.name}`; `kbvh report` writes it.", ""])
-    claims = json.loads(file.read_text())["claims"]
+    claims = sorted(json.loads(file.read_text())["claims"], key=lambda claim: in_order(claim["id"]))
     by_verdict: dict[str, list[dict[str, Any]]] = {}
     for claim in claims:
         by_verdict.setdefault(claim["verdict"], []).append(claim)
     lines += [
-        "Each claim of Zachmann & Weller 2006 is compared with measurements (E) or with counts and exact arithmetic (T). "
+        "Each claim of Zachmann & Weller 2006 is compared with measurements (E), or with counts and exact arithmetic (T, and C for the conclusions). "
         "A verdict follows from criteria that are written down as data (`analysis/claims.json`, `experiments/theory`), and from "
         f"nothing else. These are {len(claims)} claims, by the results in `{results.name}`.",
         "",

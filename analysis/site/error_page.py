@@ -36,10 +36,10 @@ def page(results: Path) -> str:
         return "\n".join([*lines, f"There is no `{file.name}` in `{results.name}`; `analysis/errors.py` makes it from results of plan `error`.", ""])
     found = time_error_panels.shown(time_error_file.read(file))
     lines += [
-        "What does an exact answer cost, and what does a fast wrong one miss? Contestants of plan `error` are wrong on purpose, and turn a dial "
-        "each: boxes made again at every n-th frame, with a margin or without, boxes and positions of fewer digits, a bound on the motion that is "
-        "too small, a budget of box tests, event times by a textbook's formula, a peer's own triangle test. Exact ones run next to them, by "
-        "turns, and every answer is compared with the exact one.",
+        "What does an exact answer cost, and what does a fast wrong one miss? The contestants of plan `error` are wrong on purpose, most of them as "
+        "far as a dial says: boxes are refitted only at every n-th frame, with a margin or without; boxes or positions have fewer digits; a bound on "
+        "the motion is too small; a query stops after a budget of box tests; event times come from a textbook's formula; a peer uses its own triangle "
+        "test. Exact contestants run by turns with them, and every answer is compared with the exact one.",
         "",
         f"The figures are drawn from `{file.name}` in `{results.name}`. `kbvh run --plan experiments/plans/error.json --out results/error` measures "
         "again, and `analysis/errors.py results/error --write FILE` makes the file.",

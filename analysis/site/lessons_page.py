@@ -16,8 +16,8 @@ def page(texts: Path, built: bool) -> str:
     """Returns the page. `built`: the course stands in the site's folder lab/lessons."""
     lines = [
         "# Lessons", "",
-        "A course on kinetic bounding volume hierarchies for a lecture or for reading alone: each lesson is a page with a lab, in "
-        "which the project's own C++ runs in the browser, predictions, proofs, and exercises that the lab checks.", "",
+        "A course on kinetic bounding volume hierarchies, for a lecture or for reading alone. Each lesson is a page with predictions, proofs, "
+        "exercises, and a lab that checks them: the project's own C++ runs there, in the browser.", "",
     ]  # fmt: skip
     if built:
         lines += ['<a href="lab/lessons/index.html">Open the course</a>, or <a href="lab/index.html">the lab alone</a>.', ""]

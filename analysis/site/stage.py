@@ -74,7 +74,7 @@ COMPARISON = """<section class="comparison" data-comparison>
 <p class="finding" aria-live="polite">A kinetic tree and a refit, on one cloth. Your browser is measuring both …</p>
 <div class="comparison-lab"></div>
 <p class="what">The project's own C++ runs here, compiled to WebAssembly: a kinetic AABB tree and a bottom-up refit, each a binary tree with one
-triangle in a leaf. Time is update and query together, of the median of several clips played by turns, on your machine. <a href="lab/index.html#scene=cloth-on-box">Open it in the lab.</a></p>
+triangle in a leaf. Times are those of update and query together: the median of several clips, played by turns on your machine. <a href="lab/index.html#scene=cloth-on-box">Open it in the lab.</a></p>
 </section>"""
 #: The links that lead on from the first page: page, question, answer.
 WAYS = [
@@ -100,7 +100,7 @@ def filled(text: str, html: Path) -> str:
 
 def report_page(html: Path, results: Path) -> str:
     """Returns the page that leads to report and explorer, as far as the site has them."""
-    lines = ["# Report and explorer", "", f"Both show the results in `{results.name}`, in one file each that needs no network.", ""]
+    lines = ["# Report and explorer", "", f"Both show the results in `{results.name}`. Each is one file and needs no network.", ""]
     for name, title, about in (
         ("report.html", "Report", "tables and figures, claim by claim"),
         ("explorer.html", "Explorer", "every measurement, filtered and drawn as you choose"),
@@ -109,7 +109,7 @@ def report_page(html: Path, results: Path) -> str:
             lines.append(f'- <a href="report/{name}">{title}</a>: {about}')
         else:
             lines.append(f"- {title}: not part of this site")
-    return "\n".join([*lines, "", "Of results of your own, `kbvh report --out DIR` makes the same two pages.", ""])
+    return "\n".join([*lines, "", "`kbvh report --out DIR` makes the same two pages of your own results.", ""])
 
 
 def notebooks(folder: Path, pages: Path) -> str:

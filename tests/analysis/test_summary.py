@@ -54,8 +54,14 @@ class TestPaper(unittest.TestCase):
         says = summary.on_the_paper(found)
         for words in ("Of its 4 claims 2 hold, 1 hold with a condition, 0 do not hold and 1 are open", "1 decided by this study and 2 by the "
                       "reference run that comes with the project (Some CPU, 2026-01-02, commit 01234567)", "judges E2 otherwise",
-                      "Claim E3 (E3) holds with a condition (the reference run)."):  # fmt: skip
+                      "The claim “Claim E3” (E3) holds with a condition, by the reference run."):  # fmt: skip
             self.assertIn(words, says)
+
+    def test_claims_stand_in_the_order_of_their_numbers(self) -> None:
+        ids = ["T2", "T10", "T1", "C1", "E10", "E3", "E1", "X1", ""]
+        verdicts = (claims.FAILS, claims.HOLDS, claims.CONDITION)
+        found = self.paper(*(row(id, verdicts[i % 3]) for i, id in enumerate(ids)))
+        self.assertEqual([one.row.id for one in found.verdicts], ["E1", "E3", "E10", "T1", "T2", "T10", "C1", "", "X1"])
 
     def test_the_main_claim_is_answered_before_its_verdict(self) -> None:
         known = {"2006:2006": ("0.037 to 3.35, 1 (with motion)", "met nowhere"), "best:2006": ("1.04 to 40.1", "met from l = 3 on"),
@@ -65,9 +71,9 @@ class TestPaper(unittest.TestCase):
         self.assertEqual(
             summary.parts_on_the_paper(self.paper(row("E3", claims.OPEN)))[0],
             "Is updating a kinetic AABB tree faster than a bottom-up refit? Against a refit as in 2006: yes if tuned here (1.04 to 40.1 times as fast), "
-            "not always if built as in 2006 (0.037 to 3.35 times as fast). Against today's best refit: no (0.0081 to 0.66 times as fast). Claim E3 (E3) holds "
-            "with a condition: tuned here against the refit of 2006 met from 3 frames a keyframe on; built as in 2006 against the refit of 2006 met nowhere; tuned here "
-            "against today's best refit met at 2 of 3 points (the reference run).",
+            "not always if built as in 2006 (0.037 to 3.35 times as fast). Against today's best refit: no (0.0081 to 0.66 times as fast). The claim “Claim E3” (E3) "
+            "holds with a condition, by the reference run. Tuned here against the refit of 2006: met from 3 frames a keyframe on. Built as in 2006 against the refit of "
+            "2006: met nowhere. Tuned here against today's best refit: met at 2 of 3 points.",
         )
 
     def test_other_kinetic_trees_are_named_where_they_beat_the_best_refit(self) -> None:
@@ -124,6 +130,17 @@ class TestSentences(unittest.TestCase):
         self.assertIn("This study has at most 4k triangles, both bodies together.", said["What to take"])
         self.assertIn("Pairs within a body (self-collision) and rays were not asked for", said["Self-collision, rays"])
         self.assertIn("answers wrongly", said["Time against error"])
+
+    def test_a_phone_shows_the_answer_of_each_line_and_folds_the_rest(self) -> None:
+        study = self.study([line("refit", 2.0), other("join", 1.0, foresight="next_keyframe")])
+        found = {one.subject: one for one in summary.sentences(study, advice.situations(advice.cells(study)), [], summary.Paper([], ""))}
+        take = found["What to take"]
+        self.assertEqual(take.first, 1, "one situation, one answer")
+        self.assertTrue(take.parts[0].startswith("With 10 frames a keyframe and more, take refit"))
+        self.assertTrue(take.parts[1].startswith("This study has at most"))
+        for one in found.values():
+            self.assertGreaterEqual(one.first, 1)
+            self.assertTrue(one.parts and one.rest, one.subject)
 
     def test_what_a_study_did_not_ask_is_answered_by_measurements_that_come_with_the_project(self) -> None:
         lines = [line("refit", 2.0), other("join", 1.0, foresight="next_keyframe")]

@@ -143,7 +143,7 @@ class TestTimeError(unittest.TestCase):
             self.assertGreaterEqual(len(marks), 2)
             self.assertGreaterEqual(len(falls), 3)
             for x, y, name in names:
-                left, right, foot = float(x), float(x) + time_error_panels.FONT * len(name), float(y)
+                left, right, foot = float(x), float(x) + time_error_panels.NAME * len(name), float(y)
                 for at, top in [*falls, *((x, str(float(y) - 4)) for x, y in marks)]:
                     self.assertFalse(left < float(at) < right and float(top) < foot, f"{name}: {at}, {top}")
 
@@ -168,6 +168,41 @@ class TestTimeError(unittest.TestCase):
                     for other, at, up, said in labels[:i]:
                         gap = abs(x - at) - half - 3.1 * len(said)
                         self.assertFalse(gap < 3 and abs(y - up) < 9, f"{crowd} {panel.name}: {word} and {said} are {gap:.1f} apart")
+
+    def test_a_strategy_with_several_dials_names_the_one_that_a_value_is_of(self) -> None:
+        lines = [exact("refit", 2.0)]
+        lines += [wrong("stale", 1.0 + every / 8, 100 * every, refit_every=every, margin=0) for every in (2, 4, 8)]
+        lines += [wrong("stale", 1.9, 20, refit_every=2, margin=0.5), wrong("other", 1.1, 950, box_tests=300), wrong("other", 1.6, 850, box_tests=900)]
+        (shown,) = time_error_panels.shown(time_error.places(self.study(lines)))
+        said = {word.replace("\u00a0", " ") for word in re.findall('class="value"[^>]*>([^<]*)<', shown.panels[0].drawn)}
+        self.assertTrue({"every 8", "300"} <= said <= {"every 2", "every 8", "margin 0", "margin 0.5", "300", "900"}, said)
+
+    def test_curves_are_drawn_where_there_is_an_error(self) -> None:
+        lines = [exact("refit", 2.0), *(wrong("stale", total, missed, refit_every=every) for every, total, missed in ((2, 1.6, 0), (3, 1.5, 0), (8, 1.2, 100)))]
+        (shown,) = time_error_panels.shown(time_error.places(self.study(lines)))
+        drawn = {panel.name: re.findall(r'class="dial"[^>]* d="([^"]*)"', panel.drawn) for panel in shown.panels}
+        self.assertEqual([way.count("M") for way in drawn["missed"]], [1], "from 3 to 8, and not along the strip from 2 to 3")
+        self.assertEqual(drawn["false"], [])
+        marks = dict(re.findall(r'translate\(([\d.]+) ([\d.]+)', shown.panels[0].drawn))
+        (begin, end) = re.findall(r"([\d.]+) ([\d.]+)", drawn["missed"][0])
+        self.assertEqual([marks[x] for x, _ in (begin, end)], [y for _, y in (begin, end)], "from mark to mark")
+
+    def test_contestants_without_an_error_stand_side_by_side_or_above_each_other(self) -> None:
+        crowd = [exact(f"tree_{i}", 2.0 + i / 40) for i in range(24)]
+        for lines in ([*crowd, wrong("a", 1.0, 500), wrong("b", 9.0, 1)], [exact("refit", 2.0), wrong("a", 1.0, 500)]):
+            (shown,) = time_error_panels.shown(time_error.places(self.study(lines)))
+            panel = shown.panels[0].drawn
+            bottom = time_error_panels.HEIGHT - time_error_panels.BOTTOM
+            (top,) = re.findall(r'<rect class="strip" x="\d+" y="([\d.]+)"', panel)
+            marks = [(float(x), float(y)) for x, y in re.findall(r'<circle class="exact"[^>]* cx="([\d.]+)" cy="([\d.]+)"', panel)]
+            self.assertEqual(len(marks), len(lines) - (len(lines) > 2) - 1)
+            for i, (x, y) in enumerate(marks):
+                self.assertTrue(float(top) + 4 < y < bottom - 4, "in the strip")
+                for at, up in marks[:i]:
+                    self.assertGreater(max(abs(x - at), abs(y - up)), time_error_panels.ROW - 0.2)
+            others = [float(y) for y in re.findall(r'class="mark"[^>]*translate\([\d.]+ ([\d.]+)', panel)]
+            self.assertTrue(others and max(others) < float(top), "all others above the strip")
+            self.assertEqual(re.findall(r">\((\d+)\)<", panel), ["24"] if len(lines) > 2 else [])
 
     def test_every_panel_says_what_it_shows(self) -> None:
         lines = [exact("join", 0.8, foresight="next_keyframe"), exact("refit", 2.0), wrong("a", 1.0, 500, extra=10), wrong("b", 1.5, 5), wrong("c", 3.0, 0)]

@@ -149,6 +149,15 @@ test('the first page is short, and on a phone the comparison keeps its transport
   assert.equal((await firstPage('dark', 390)).hit, 'play');
 });
 
+test('on a phone the report is at most five screens long, and all of it unfolds', async () => {
+  await open('report/report.html', 'light', 390);
+  const [tall, folds] = await page.evaluate(() => [document.documentElement.scrollHeight, document.querySelectorAll('.fold:not([open])').length]);
+  assert.ok(tall <= 5 * 844, `${tall} pixels`);
+  assert.ok(folds > 2, `${folds} folds`);
+  await size(1280).then(drawn);
+  await page.waitForFunction(() => !document.querySelector('.fold:not([open])'));
+});
+
 test('lab, course, report, explorer, Python and C++ are part of the site', () => {
   for (const name of ['lab/index.html', 'lab/lessons/index.html', 'report/report.html', 'report/explorer.html', 'python.html', 'notebooks.html', 'cpp.html', 'api/index.html'])
     assert.ok(existsSync(join(site, name)), name);

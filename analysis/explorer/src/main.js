@@ -11,7 +11,7 @@ import { FACETS, decode, encode, initial } from "./state.js";
 import * as statistics from "./statistics.js";
 import { FRAMES, classOf, situations } from "./advice.js";
 import { answer } from "./views/answer.js";
-import { claims } from "./views/claims.js";
+import { ORDERS, claims } from "./views/claims.js";
 import { errors, errs } from "./views/errors.js";
 import { frames } from "./views/frames.js";
 import { overview, profiled } from "./views/overview.js";
@@ -35,7 +35,7 @@ const VIEWS = {
   scaling: { name: "Over l and n", draw: scaling, uses: ["measure", "per", "contestants"] },
   frames: { name: "Frames over time", draw: frames, uses: ["cell", "per", "contestants"] },
   versus: { name: "A against B", draw: versus, uses: ["measure", "contestants"], shown: () => sources(model).size > 1 },
-  claims: { name: "The paper's claims", draw: claims, uses: [], shown: () => model.data.claims.length > 0 },
+  claims: { name: "The paper's claims", draw: claims, uses: ["claims"], shown: () => model.data.claims.length > 0 },
   runs: { name: "All runs", draw: runs, uses: ["measure", "against", "contestants"] },
 };
 let views = [];
@@ -123,6 +123,7 @@ function tools(uses, current) {
         state.cells,
         (cells) => set({ cells }),
       ),
+    claims: () => choice("Order of the claims", ORDERS, state.claims, (order) => set({ claims: order })),
   };
   host.tools.replaceChildren(...uses.map((name) => all[name]()).filter(Boolean));
 }
@@ -206,9 +207,9 @@ function mixture() {
   return make(
     "p",
     { class: "lead mixture" },
-    "All situations of these results are mixed here: sizes, frames a keyframe, pairs of two bodies and within one, and what is known of the future. For one of them, ",
+    "This view mixes all situations of these results: sizes, frames a keyframe, pairs of two bodies and within one, and what is known of the future. For a single situation, ",
     make("button", { type: "button", class: "quiet", text: "see the answer", click: () => set({ view: "answer" }) }),
-    " or filter.",
+    " or use the filters.",
   );
 }
 
@@ -241,7 +242,7 @@ function showFilters(open) {
 /** Redraws what depends on the changed parts of the state. */
 function draw(changed) {
   const only = (...names) => changed?.length && changed.every((name) => names.includes(name));
-  if (!only("point", "sort", "view", "a", "b", "cell", "against", "measure")) drawFilters();
+  if (!only("point", "sort", "view", "a", "b", "cell", "against", "measure", "claims")) drawFilters();
   drawPanel();
   if (only("point")) markChosen();
   else {
@@ -383,7 +384,7 @@ function build() {
   document.head.append(
     make("style", {
       class: "contestants",
-      text: `:root{${paints(model.contestants, "light")}}:root[data-scheme=dark]{${paints(model.contestants, "dark")}}`,
+      text: `:root{${paints(model.contestants, "light")}}@media screen{:root[data-scheme=dark]{${paints(model.contestants, "dark")}}}`,
     }),
   );
   host.open = make("button", {

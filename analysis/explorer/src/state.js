@@ -21,6 +21,7 @@ const DEFAULTS = {
   a: "",
   b: "",
   sort: "",
+  claims: "number", // the order of the paper's claims, or "worst", "best": by verdict
   point: "",
 };
 

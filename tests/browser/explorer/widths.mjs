@@ -77,6 +77,7 @@ for (const which of ["reference", "merged"])
   for (const [width, scheme] of [
     [1280, "light"],
     [1280, "dark"],
+    [800, "light"],
     [390, "light"],
     [390, "dark"],
   ])
@@ -84,7 +85,16 @@ for (const which of ["reference", "merged"])
       assert.ok(statSync(expected[which].report).size < 2e6);
       const page = await open(which, "", { width, scheme, file: "report" });
       const tall = await page.evaluate(() => document.documentElement.scrollHeight);
-      if (width === 1280) assert.ok(tall <= 5 * 900, `${tall} pixels`);
+      // Five screens: of a desktop, and of a phone of 390 x 844.
+      if (width !== 800) assert.ok(tall <= 5 * (width === 1280 ? 900 : 844), `${tall} pixels`);
+      const folds = await page.$$eval(".fold", (list) =>
+        list.filter((one) => !one.parentElement.closest("details:not([open])")).map((one) => [one.open, one.querySelector("summary").offsetHeight > 0, one.querySelector("summary").textContent]),
+      );
+      assert.ok(folds.length > 2);
+      for (const [isOpen, named, title] of folds) {
+        assert.equal(isOpen, width > 760, title);
+        assert.equal(named, width < 760 && title !== "", title);
+      }
       assert.deepEqual(await beyond(page), []);
       const contrast = await page.evaluate(() => getComputedStyle(document.documentElement).color);
       assert.equal(contrast === "rgb(29, 33, 41)", scheme === "light");
@@ -112,6 +122,34 @@ await check("the report's top answers, and its links unfold what they lead to", 
   assert.equal(await claim.$eval("#claim-E1", (one) => one.open && one.closest("#claims").open), true);
   await claim.close();
   leave(page);
+});
+
+await check("what a phone folds unfolds by a tap, in a wide window and on paper", async () => {
+  const page = await load("reference", "", { width: 390, file: "report" });
+  const folded = () => page.$$eval(".fold", (list) => list.filter((one) => !one.open).length);
+  const whole = () => page.waitForFunction(() => [...document.querySelectorAll(".fold")].every((one) => one.open));
+  const all = await folded();
+  assert.ok(all > 2);
+  await page.click(".sentences .fold summary");
+  assert.equal(await folded(), all - 1);
+  await page.setViewport({ width: 1280, height: 900 });
+  await whole();
+  assert.equal(await page.$eval(".fold > summary", (one) => one.offsetHeight), 0);
+  await page.setViewport({ width: 390, height: 844 });
+  await page.waitForFunction(() => [...document.querySelectorAll(".fold")].every((one) => !one.open));
+  await page.emulateMediaType("print");
+  await whole();
+  await page.close();
+});
+
+await check("on paper the explorer's dark scheme is light", async () => {
+  const page = await load("reference");
+  await page.click("#theme");
+  const ink = () => page.evaluate(() => getComputedStyle(document.documentElement).color);
+  assert.equal(await ink(), "rgb(230, 232, 236)");
+  await page.emulateMediaType("print");
+  assert.equal(await ink(), "rgb(29, 33, 41)");
+  await page.close();
 });
 
 // --- speed ----------------------------------------------------------------------------------------------------

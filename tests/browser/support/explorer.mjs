@@ -73,7 +73,8 @@ export async function open(which, link = "", { width = 1440, scheme = "light", f
       document.activeElement?.blur();
       history.replaceState(null, "", link || location.pathname);
       if (window.explorer) dispatchEvent(new PopStateEvent("popstate"));
-      else document.querySelectorAll("details").forEach((one) => (one.open = false)); // a report, as it is loaded
+      else // a report, as it is loaded
+        document.querySelectorAll("details").forEach((one) => (one.open = one.classList.contains("fold") && innerWidth > 760));
       scrollTo(0, 0);
     }, link);
     await drawn(page);

@@ -3,16 +3,25 @@ import { make } from "../dom.js";
 import { plural } from "../words.js";
 
 const HERE = "this study";
+/** The verdicts, from the best to the worst. */
+const VERDICTS = ["holds", "holds with a condition", "does not hold"];
+/** The orders of the list, by the words of the choice: the data have the claims by number. */
+export const ORDERS = { number: "by number: E1, E2, …", worst: "what does not hold first", best: "what holds first" };
 
-export function claims({ model }) {
+/** Returns claims in an order of ORDERS; those of one verdict stay by number, and so do all in an unknown order. */
+export function inOrder(claims, order) {
+  const sign = { worst: -1, best: 1 }[order] ?? 0;
+  return claims.toSorted((a, b) => sign * (VERDICTS.indexOf(a.verdict) - VERDICTS.indexOf(b.verdict)));
+}
+
+export function claims({ model, state }) {
   const { claims: decided, report, reference, paper } = model.data;
   return [
-    ...(paper ?? []).map((text) => make("p", { class: "main-claim", text })),
     make(
       "p",
       { class: "lead tally" },
       "Does the paper hold? ",
-      ["holds", "holds with a condition", "does not hold"].map((verdict) => {
+      VERDICTS.map((verdict) => {
         const mine = decided.filter((one) => one.verdict === verdict);
         const by = mine.filter((one) => one.source !== HERE).length;
         return (
@@ -23,11 +32,12 @@ export function claims({ model }) {
         );
       }),
     ),
+    ...(paper ?? []).map((text) => make("p", { class: "main-claim", text })),
     make("p", {
       class: "note",
-      text: `${plural(decided.length, "claim")} of Zachmann and Weller (2006), experiments (E), then theory (T), judged by thresholds in analysis/claims.json: by these results where they decide, else by the reference run that comes with the project${reference ? ` (${reference})` : ""}. Sizes here count the moving body only, as in the paper.`,
+      text: `The ${plural(decided.length, "claim")} of Zachmann and Weller (2006): experiments (E), theory (T) and conclusions (C). These results judge the claims that they can decide; the reference run that comes with the project${reference ? ` (${reference})` : ""} judges the others. The thresholds are in analysis/claims.json. Sizes here count the moving body only, as in the paper.`,
     }),
-    ...decided.map((one) => {
+    ...inOrder(decided, state.claims).map((one) => {
       const picture = make("div", { class: "drawn" });
       picture.innerHTML = one.picture; // made by analysis/claims/claim_pictures.py
       const verdict = (text) => make("span", { class: `verdict ${text.replaceAll(" ", "-")}`, text });
@@ -50,7 +60,7 @@ export function claims({ model }) {
             {},
             one.paper && make("p", { class: "note", text: `${one.id.startsWith("E") ? "Paper" : "Bound"}: ${one.paper}` }),
             one.corners?.length > 0 && [
-              make("p", { class: "note", text: "Measured factors, without motion evaluation, of each pair that is compared:" }),
+              make("p", { class: "note", text: "What was measured, without motion evaluation, for each pair of programs that is compared:" }),
               make(
                 "ul",
                 { class: "corners" },

@@ -90,14 +90,14 @@ export function errors(context) {
     return [
       empty(
         `Time against error: ${cell.title}`,
-        "All contestants of this cell have the same errors; the numbers of a point tell them. Cells whose contestants err come first in the menu.",
+        "All contestants of this cell have the same errors. Cells with contestants that err come first in the menu.",
       ),
     ];
   return [
     ...["none", ""].map((known) => bargain(model, runs, known)).map((text, i, all) => text && text !== all[i - 1] && make("p", { class: "bargain", text })),
     make("p", {
       class: "lead",
-      text: `Every contestant and setting of one cell, those without a guarantee included: ${cell.title}. Down and to the left is better; the line joins those that no other beats in both.`,
+      text: `One cell, with every contestant and setting, also those without a guarantee: ${cell.title}. Further down and further left is better. The line joins the contestants that no other one beats in both time and error.`,
     }),
     make("div", { class: "pair" }, figures),
     context.legendList([...new Map(runs.map(({ contestant: one }) => [one.id, [looks.get(one.id) ?? one, one.title]])).values()]),

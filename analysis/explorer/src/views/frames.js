@@ -31,7 +31,7 @@ export function frames(context) {
             shown,
             "latency",
             `Latency over the clip: ${cell.title}`,
-            "Update and query, means of equal parts of the clip; motion evaluation is not included. A rising line is a tree whose age costs time, or a clip with more to find.",
+            "Update and query, means of equal parts of the clip; motion evaluation is not included. A line rises where an aging tree costs time, or where there is more to find.",
             "ms per frame",
             (run) => run.pace.map(([begin, update, query]) => [begin, update + query]),
           ),
@@ -61,7 +61,7 @@ export function frames(context) {
             shown,
             "quality",
             `Quality of the tree over the clip: ${cell.title}`,
-            "Cost of a random query by the surface-area heuristic, over that of a tree built with it at that time. A level line is a tree that does not age.",
+            "What the surface-area heuristic expects a random query to cost, divided by the same for a tree that is built at that time. A level line is a tree that does not age.",
             "× the cost of a rebuilt tree",
             (run) => share(run.quality.map(([t, quality]) => [t, quality])),
           ),
@@ -99,7 +99,7 @@ function worst({ model, state, choose }, cell, runs) {
   return figure({
     title: `Worst frames: ${cell.title}`,
     reading:
-      "The marker is the median frame, the bar reaches to the 99th percentile, the cross is the worst frame (update and query, without motion evaluation). A long line is a stutter, even if the mean is good.",
+      "Update and query, without motion evaluation. The marker is the median frame, the bar ends at the 99th percentile, and the cross is the worst frame. A long line means stutter, even if the mean is good.",
     notes: axis.outside ? [`${plural(axis.outside, "value")} beyond the axis: arrows at its edge.`] : [],
     least: 340,
     plot: (width) => {
@@ -238,7 +238,7 @@ function stutter({ model, state, choose }, cells) {
   return figure({
     title: "How much worse than the median is the worst frame? Every cell",
     reading:
-      "Each mark is one cell, the line the median over the cells. Cells differ in what they find per frame, so this compares strategies, not scenes.",
+      "Each mark is one cell; the line is the median over the cells. Compare strategies here, not scenes: what there is to find in a frame differs from scene to scene.",
     notes: axis.outside ? [`${plural(axis.outside, "point")} beyond the axis: arrows at its edge.`] : [],
     least: 340,
     plot: (width) => {

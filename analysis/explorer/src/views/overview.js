@@ -49,7 +49,7 @@ const BASIS = {
 
 function profileFigure({ model, state, choose }, found) {
   const measure = MEASURES[state.measure];
-  const title = `How often is who within a factor of the best? ${sentence(measure.name)}`;
+  const title = `How often is each strategy within a factor of the best? ${sentence(measure.name)}`;
   if (!found.length)
     return empty(
       title,
@@ -91,7 +91,7 @@ function profileFigure({ model, state, choose }, found) {
   return figure({
     title,
     reading:
-      `A line at 60 % above 1.25 is a strategy that in 60 % of the cells takes at most 1.25 times as long as the fastest of the cell; the higher a line begins, the more often it is the fastest, and the more to the left it rises, the less it costs to rely on it. ` +
+      `Where a line is at 60 % above 1.25, the strategy takes at most 1.25 times as long as the fastest one in 60 % of the cells. A line that begins high is often the fastest; a line that has risen far left is seldom much slower. ` +
       `${plural(cells, "cell")}: scenes at their sizes, l and scalars${model.several.machines || model.several.commits ? ", by machine and commit" : ""}. ${BASIS[state.cells]}`,
     plot: (width) => ({
       height: Math.max(300, Math.min(440, width * 0.75)),
@@ -290,7 +290,7 @@ function matrix({ model, state, set, choose }, cells) {
         make("span", { class: "swatch faster", text: "blue" }),
         " is faster, ",
         make("span", { class: "swatch slower", text: "orange" }),
-        " slower; bold where the 95 % interval excludes 1. A number leads to its measurement; a name becomes what the others are compared with. The geometric mean is over the cells that a strategy has.",
+        " slower; bold where the 95 % interval excludes 1. Choose a number to see its measurement, or a name to compare the others with it. Each geometric mean is over the cells in which the strategy was measured.",
       ),
     ),
     make("div", { class: "scroll matrix-scroll", tabindex: 0 }, grid),

@@ -68,7 +68,7 @@ export function pairwise(context) {
     figure({
       title,
       reading:
-        `A point to the right of 1 is faster, and its line is the 95 % interval of the ratio (bootstrap over whole rounds) or, with fewer than five repetitions, their range (~ where the two were measured in different sessions). The last row has the geometric means over the cells of each strategy, between those of their intervals' ends.` +
+        `A point to the right of 1 is faster. Its line is the 95 % interval of the ratio (bootstrap over whole rounds) or, with fewer than five repetitions, their range; ~ marks ratios of different sessions. The last row has the geometric mean over each strategy's cells; its line reaches from the mean of the intervals' lower ends to that of their upper ends.` +
         (state.strategy.length
           ? ""
           : ` Shown are the ${plural(looks.length, "strategy").replace("strategys", "strategies")} with the best profiles; the filter of strategies shows others.`),

@@ -24,7 +24,7 @@ export function scaling(context) {
         make("h2", { text: "Over l, the frames per keyframe" }),
         make("p", {
           class: "lead",
-          text: "Event-driven work depends on keyframes only: such a line falls as more frames share it, while a refit pays for every frame and stays level.",
+          text: "The work of event-driven strategies depends on the keyframes only: their lines fall as more frames share it. A refit pays for every frame, so its line is level.",
         }),
         figures(context, over_l, "l", strong),
       ),
