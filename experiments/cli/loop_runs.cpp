@@ -143,8 +143,9 @@ void print_several(const LiveStudy& study, const std::vector<LiveRun>& runs) {
   }
   print(columns(table, longest_line));
   print(
-      "Times are means over the steps made now, but for the worst step. Over refit: detection of the fastest "
-      "refit of the\ntable over that of the line. States: those after every step, compared with those of " +
+      "Times are means over the steps made now, but for the worst step. Over refit: detection of the "
+      "table's\n"
+      "fastest refit over that of the line. States: those after every step, compared with those of\n" +
       reference.finder.label + ".\n");
 }
 
