@@ -221,6 +221,8 @@ TEST(LiveStrategies, GoOnWithTheSameBitsAfterTheyWereKilled) {
   const TemporaryFolder folder;
   SimulationOptions options = small("sphere", 40);
   options.save_every = 4;
+  options.record = true;
+  options.folder = folder / "whole";
   const std::uint64_t expected = hash_of_state(simulate(options).state);
   options.strategy.id = "lbvh";
   options.folder = folder / "out";
@@ -233,6 +235,8 @@ TEST(LiveStrategies, GoOnWithTheSameBitsAfterTheyWereKilled) {
   const SimulationResult continued = simulate(options);
   EXPECT_EQ(continued.first_step, 32u);
   EXPECT_EQ(hash_of_state(continued.state), expected);
+  EXPECT_EQ(text_of_file(folder / "out" / "loop.recording"),
+            text_of_file(folder / "whole" / "loop.recording"));
   const std::vector<json> lines = lines_of(options.folder / "loop.jsonl");
   ASSERT_EQ(lines.size(), 41u);
   EXPECT_EQ(lines[0].at("options").at("strategy"), "lbvh");
