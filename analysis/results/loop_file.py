@@ -35,7 +35,7 @@ class Simulation:
     driven: bool  #: a script moves some of its vertices
     time_step: float  #: in s
     seed: int
-    detection: str
+    detection: str  #: the way of the broad phase, or the strategy that found the pairs
     steps: pd.DataFrame  #: NEEDED; momentum as x, y, z; resident_bytes, NaN where it was not recorded
     frames: tuple[tuple[int, Path], ...]  #: step and OBJ file of each frame, in order
 
@@ -85,7 +85,7 @@ def _simulation(folder: Path, header: dict[str, Any], records: list[dict[str, An
         driven=int(mesh.get("driven_vertices", 0)) > 0,
         time_step=float(header["physics"]["time_step_s"]),
         seed=int(options["seed"]),
-        detection=str(options["detection"]),
+        detection=str(options.get("strategy") or options["detection"]),
         steps=steps,
         frames=tuple(sorted((int(path.stem.split("_")[1]), path) for path in (folder / "frames").glob("frame_*.obj"))),
     )

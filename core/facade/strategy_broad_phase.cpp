@@ -16,7 +16,7 @@ namespace kbvh {
 template <class S>
 struct detail::StrategySearch {
   StrategySearch(Scene<S> bodies, const Contestant& contestant, double t)
-      : scene(std::move(bodies)), session(scene, contestant) {
+      : scene(std::move(bodies)), session(scene, contestant, Use::timed) {
     session.reset(t);
   }
   Scene<S> scene;
@@ -132,6 +132,19 @@ void StrategyBroadPhase<S>::detect(CandidateKind kind, CandidateBuffer& out) {
   std::transform(search->pairs.begin(), search->pairs.end(), out.begin(), [](const PrimitivePair& pair) {
     return Candidate{pair.primitive_a, pair.primitive_b};
   });
+}
+
+template <class S>
+std::size_t StrategyBroadPhase<S>::bytes() const {
+  std::size_t total =
+      (corners_.capacity() + boxes_.capacity() + begin_points_.capacity() + end_points_.capacity()) *
+      sizeof(S);
+  for (const Primitives& list : nets_.lists)
+    total += (list.offsets.capacity() + list.vertices.capacity()) * sizeof(std::uint32_t);
+  for (const std::unique_ptr<detail::StrategySearch<S>>& search : searches_)
+    if (search != nullptr)
+      total += search->session.strategy().bytes() + search->pairs.capacity() * sizeof(PrimitivePair);
+  return total;
 }
 
 template class StrategyBroadPhase<float>;

@@ -1,5 +1,6 @@
 #pragma once
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -61,6 +62,8 @@ class StrategyBroadPhase {
   void detect(CandidateKind kind, CandidateBuffer& out);
 
   const std::string& strategy() const { return strategy_; }
+  /// Returns the memory of the boxes, the strategy's structures and the lists, in bytes.
+  std::size_t bytes() const;
 
  private:
   void start(const MatrixView<S>& v0, const MatrixView<S>& v1, Elements elements, double radius);

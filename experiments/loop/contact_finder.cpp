@@ -2,8 +2,8 @@
 
 #include <chrono>
 #include <stdexcept>
+#include <vector>
 
-#include "core/base/hasher.hpp"
 #include "experiments/common/stopwatch.hpp"
 #include "experiments/common/text.hpp"
 
@@ -12,14 +12,6 @@ namespace {
 
 /// Groups of vertices: those of obstacles pair with others only.
 constexpr GroupMask moving_group{1, ~std::uint32_t(0)}, obstacle_group{2, ~std::uint32_t(2)};
-
-/// Returns whether the seeded fault takes a pair.
-bool is_lost(CandidateKind kind, const Candidate& pair, std::uint32_t every) {
-  Hasher hash;
-  hash.mix(std::uint64_t(pair.first) << 32 | pair.second);
-  hash.mix(std::uint64_t(kind));
-  return (hash.value() >> 32) % every == 0;
-}
 
 }  // namespace
 
@@ -44,18 +36,17 @@ Detection detection(const std::string& word) {
   throw std::invalid_argument(no_such("way to detect", word, known));
 }
 
-ContactMesh::ContactMesh(const SimulatedMesh& mesh)
-    : vertices(mesh.vertex_count()),
-      edges(mesh.edges),
-      faces(mesh.faces),
-      obstacle(mesh.obstacle),
-      inner(mesh.inner) {}
-
 IterateDetector::IterateDetector(const ContactMesh& mesh, const Settings& settings)
     : mesh_(mesh), settings_(settings) {
   if ((settings.detection == Detection::kept) != (settings.keep > 0))
     throw std::invalid_argument(
         "a bound on displacements belongs to the way 'kept', and must be positive there");
+  if (settings.strategy.id.empty()) return;
+  if (settings.detection != Detection::refit)
+    throw std::invalid_argument(std::string("the way '") + name(settings.detection) +
+                                "' belongs to kbvh::broad_phase; a strategy has its own");
+  by_strategy_ =
+      std::make_unique<StrategyContacts>(mesh, settings.strategy, settings.radius, settings.lose_every);
 }
 
 void IterateDetector::build(const Positions& x) {
@@ -73,12 +64,14 @@ void IterateDetector::build(const Positions& x) {
 }
 
 void IterateDetector::update(const Positions& x) {
+  if (by_strategy_) return by_strategy_->update(x);
   if (!broad_.built()) return build(x);
   if (settings_.detection == Detection::rebuild) broad_.forget_trees();
   broad_.update(x);
 }
 
 void IterateDetector::update(const Positions& x, const Positions& end) {
+  if (by_strategy_) return by_strategy_->update(x, end);
   if (!broad_.built()) build(x);
   if (settings_.detection == Detection::rebuild) broad_.forget_trees();
   broad_.update(x, end);
@@ -102,8 +95,8 @@ ContactFinder::Pair ContactFinder::pair_of(ContactKind kind, const Candidate& ca
 }
 
 void ContactFinder::search() {
-  work_.candidates += broad().candidates(CandidateKind::face_vertex).size();
-  work_.candidates += broad().candidates(CandidateKind::edge_edge).size();
+  work_.candidates += detector_.candidates(CandidateKind::face_vertex).size();
+  work_.candidates += detector_.candidates(CandidateKind::edge_edge).size();
   ++work_.questions;
 }
 
@@ -111,7 +104,7 @@ void ContactFinder::look_at(const Positions& x) {
   const auto begin = std::chrono::steady_clock::now();
   detector_.update(x);
   search();
-  work_.searches = broad().detections();
+  work_.searches = detector_.searches();
   work_.detect_seconds += seconds_since(begin);
 }
 
@@ -124,17 +117,17 @@ double ContactFinder::look_along(std::uint32_t iterate, const Positions& x, cons
   work_.detect_seconds += seconds_since(begin);
   const auto searched = std::chrono::steady_clock::now();
   double part = 1;
-  EarliestImpact impact = broad().earliest_impact(separation);
+  EarliestImpact impact = detector_.earliest_impact(separation);
   // A time of impact is enclosed to 2^-20 of the motion: where that is too coarse, a shorter part is asked
   // about.
   while (impact.touches && impact.begin < 0x1p-10 && part > 1e-12) {
     part *= 0x1p-9;
     part_ = x + part * (end - x);
     detector_.update(x, part_);
-    impact = broad().earliest_impact(separation);
+    impact = detector_.earliest_impact(separation);
   }
   work_.impact_seconds += seconds_since(searched);
-  work_.searches = broad().detections();
+  work_.searches = detector_.searches();
   if (part <= 1e-12) return 0;
   return impact.touches ? 0.9 * impact.begin * part : part;
 }

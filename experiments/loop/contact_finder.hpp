@@ -1,12 +1,14 @@
 #pragma once
+#include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
-#include <vector>
 
 #include "core/broad_phase/broad_phase.hpp"
 #include "experiments/loop/closest_points.hpp"
-#include "experiments/loop/simulated_mesh.hpp"
+#include "experiments/loop/contact_mesh.hpp"
+#include "experiments/loop/strategy_contacts.hpp"
 
 namespace kbvh::experiments::loop {
 
@@ -21,20 +23,8 @@ const char* name(Detection detection);
 /// Finds a way by its name. Throws std::invalid_argument that lists the known names.
 Detection detection(const std::string& name);
 
-/// What a broad phase is told about a mesh: which of its elements may touch.
-struct ContactMesh {
-  std::uint32_t vertices = 0;
-  EdgeList edges;
-  FaceList faces;
-  std::vector<std::uint8_t>
-      obstacle;                      ///< [vertex]; elements of such vertices alone are no pairs of each other
-  std::vector<std::uint32_t> inner;  ///< vertices that touch nothing
-
-  ContactMesh() = default;
-  explicit ContactMesh(const SimulatedMesh& mesh);
-};
-
-/// The broad phase of one simulation or of one replay, used in one of the ways.
+/// What finds the pairs of one simulation or of one replay: a broad phase, used in one of the ways, or a
+/// strategy.
 class IterateDetector {
  public:
   struct Settings {
@@ -42,16 +32,29 @@ class IterateDetector {
     double keep = 0;               ///< m: the bound of `kept`, positive there
     double radius = 0;             ///< m
     std::uint32_t lose_every = 0;  ///< a fault for tests: loses one pair of so many, by its ids; 0: none
+    ContactStrategy strategy{};  ///< if named, finds the pairs; `detection` is then `refit`, without a bound
   };
-  /// Keeps a reference to the mesh. Throws std::invalid_argument for a bound that does not fit the way.
+  /// Keeps a reference to the mesh. Throws std::invalid_argument for a bound that does not fit the way, and
+  /// for another way with a strategy; ConfigError as check_contact_strategy.
   IterateDetector(const ContactMesh& mesh, const Settings& settings);
 
   /// Takes positions; rows are vertices.
   void update(const Positions& x);
   /// Takes a motion.
   void update(const Positions& x, const Positions& end);
+  /// Returns the candidates of the last positions or motion; valid until the next update.
+  std::span<const Candidate> candidates(CandidateKind kind) {
+    return by_strategy_ ? by_strategy_->candidates(kind) : broad_.candidates(kind);
+  }
+  /// Returns the earliest impact of the last motion (BroadPhase::earliest_impact).
+  EarliestImpact earliest_impact(double separation) {
+    return by_strategy_ ? by_strategy_->earliest_impact(separation) : broad_.earliest_impact(separation);
+  }
+  /// Returns the number of searches, of one kind of pairs each.
+  std::uint64_t searches() const { return by_strategy_ ? by_strategy_->searches() : broad_.detections(); }
+  std::size_t bytes() const { return by_strategy_ ? by_strategy_->bytes() : broad_.bytes(); }
+  /// Returns the broad phase, for what strategies do not answer; unused if a strategy is named.
   BroadPhase<double>& broad() { return broad_; }
-  const BroadPhase<double>& broad() const { return broad_; }
   const Settings& settings() const { return settings_; }
 
  private:
@@ -60,6 +63,7 @@ class IterateDetector {
   const ContactMesh& mesh_;
   Settings settings_;
   BroadPhase<double> broad_;
+  std::unique_ptr<StrategyContacts> by_strategy_;  // null: none is named
 };
 
 /// Takes what a simulator asks at each iterate.
@@ -102,17 +106,16 @@ class ContactFinder {
   /// Calls take(pair) for each candidate, in an order that depends on the trees.
   template <class Take>
   void for_each(const Take& take) {
-    for (const Candidate& candidate : broad().candidates(CandidateKind::face_vertex))
+    for (const Candidate& candidate : detector_.candidates(CandidateKind::face_vertex))
       take(pair_of(ContactKind::face_vertex, candidate));
-    for (const Candidate& candidate : broad().candidates(CandidateKind::edge_edge))
+    for (const Candidate& candidate : detector_.candidates(CandidateKind::edge_edge))
       take(pair_of(ContactKind::edge_edge, candidate));
   }
 
   const DetectionWork& work() const { return work_; }
-  std::size_t bytes() const { return detector_.broad().bytes() + sizeof(double) * std::size_t(part_.size()); }
+  std::size_t bytes() const { return detector_.bytes() + sizeof(double) * std::size_t(part_.size()); }
 
  private:
-  BroadPhase<double>& broad() { return detector_.broad(); }
   Pair pair_of(ContactKind kind, const Candidate& candidate) const;
   void search();
 

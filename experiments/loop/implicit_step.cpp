@@ -176,7 +176,7 @@ StepReport ImplicitStep::advance(State& state) {
   collect(x_, active_);
   find_friction();
   double present = energy(x_, active_);
-  if (!std::isfinite(present)) throw std::runtime_error("two surfaces are nearer than their thickness");
+  if (!std::isfinite(present)) throw TooNear("two surfaces are nearer than their thickness");
   StepReport result;
   std::uint32_t evaluations = 0;
   while (result.iterates < physics.most_iterations) {

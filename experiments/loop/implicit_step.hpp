@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <stdexcept>
 #include <vector>
 
 #include "experiments/loop/barrier.hpp"
@@ -19,6 +20,12 @@ struct State {
 
 /// Returns the state in which a scene starts.
 State first_state(const SimulatedMesh& mesh);
+
+/// Reports a state in which a pair of surfaces is nearer than their thickness: an earlier step was not told
+/// of this pair.
+struct TooNear : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
 
 /// How a step ended.
 enum class Ending : std::uint8_t {
@@ -57,8 +64,8 @@ class ImplicitStep {
   /// Keeps references to the scene and the finder, whose radius must be that of the scene's physics.
   ImplicitStep(const Simulated& scene, ContactFinder& finder);
 
-  /// Replaces the state by that one time step later. Throws std::runtime_error if a pair of the state is
-  /// nearer than the thickness, or a direction cannot be computed.
+  /// Replaces the state by that one time step later. Throws TooNear, and leaves the state, if a pair of the
+  /// state is nearer than the thickness, and std::runtime_error if a direction cannot be computed.
   StepReport advance(State& state);
 
   const Barrier& barrier() const { return barrier_; }

@@ -28,10 +28,21 @@ namespace {
 
 /// What distinguishes a simulation from others; the number of steps does not.
 json identity_of(const SimulationOptions& options) {
-  return {{"scene", options.scene},   {"triangles", options.triangles},
-          {"seed", options.seed},     {"detection", name(options.detection)},
-          {"keep", options.keep},     {"lose_every", options.lose_every},
-          {"record", options.record}, {"frames_every", options.frames_every}};
+  json identity{{"scene", options.scene},
+                {"triangles", options.triangles},
+                {"seed", options.seed},
+                {"detection", name(options.detection)},
+                {"keep", options.keep},
+                {"strategy", nullptr},
+                {"lose_every", options.lose_every},
+                {"record", options.record},
+                {"frames_every", options.frames_every}};
+  if (!options.strategy.id.empty()) {
+    identity["detection"] = "strategy";
+    identity["strategy"] = options.strategy.id;
+    identity["params"] = options.strategy.params;
+  }
+  return identity;
 }
 
 /// Returns how many of the first faces belong to obstacles.
@@ -214,15 +225,17 @@ std::uint64_t hash_of_state(const State& state) {
 SimulationResult simulate(const SimulationOptions& options, const std::function<void(const json&)>& done) {
   const Simulated scene = make_scene(options.scene, options.triangles, options.seed);
   if (options.save_every == 0) throw std::invalid_argument("a state is saved every 0 steps");
+  const ContactMesh contact_mesh(scene.mesh);
+  if (!options.strategy.id.empty()) check_contact_strategy(options.strategy, contact_mesh);
   SavedState saved;
   saved.state = first_state(scene.mesh);
   SimulationFiles files(options, scene, saved);
   SimulationResult result;
   result.first_step = saved.state.step;
-  const ContactMesh contact_mesh(scene.mesh);
   const double radius = scene.physics.radius();
-  ContactFinder finder(contact_mesh, {options.detection, options.keep * radius, radius, options.lose_every},
-                       files.sink());
+  ContactFinder finder(
+      contact_mesh, {options.detection, options.keep * radius, radius, options.lose_every, options.strategy},
+      files.sink());
   ImplicitStep step(scene, finder);
   PenetrationCheck check(scene.mesh);
   files.save_frame_of(saved.state);
@@ -230,7 +243,14 @@ SimulationResult simulate(const SimulationOptions& options, const std::function<
     files.begin_step(saved.state.step);
     const DetectionWork before = finder.work();
     const auto begin = std::chrono::steady_clock::now();
-    const StepReport report = step.advance(saved.state);
+    StepReport report;
+    try {
+      report = step.advance(saved.state);
+    } catch (const TooNear&) {
+      result.too_near = true;
+      files.save(saved);
+      break;
+    }
     const double seconds = seconds_since(begin);
     const DetectionWork& after = finder.work();
     const double detect = after.detect_seconds - before.detect_seconds,

@@ -16,6 +16,7 @@ struct SimulationOptions {
   Detection detection = Detection::refit;
   double keep = 0;                 ///< the bound of `kept`, as a multiple of the radius
   std::uint64_t save_every = 10;   ///< steps
+  ContactStrategy strategy{};      ///< if named, finds the pairs; `detection` is then `refit`, `keep` 0
   std::uint32_t lose_every = 0;    ///< IterateDetector::Settings
   bool record = false;             ///< writes loop.recording
   std::uint64_t frames_every = 0;  ///< steps between two frames as OBJ files; 0: none
@@ -28,6 +29,7 @@ struct SimulationResult {
   std::uint64_t first_step = 0;         ///< where an earlier run was continued; 0: there was none
   std::uint64_t penetrations = 0;       ///< intersecting pairs of triangles, summed over steps
   std::uint64_t first_penetration = 0;  ///< the number of steps after which the first were counted; 0: none
+  bool too_near = false;  ///< no step followed the last one: it left a pair nearer than the thickness
   std::uint64_t stalled = 0, unconverged = 0;  ///< steps with these endings
   double detect_seconds = 0, impact_seconds = 0, rest_seconds = 0;
 };
@@ -42,10 +44,11 @@ std::uint64_t hash_of_state(const State& state);
 ///   loop.recording  with `record`: see recording.hpp
 ///   frames/         with `frames_every`: see frames.hpp
 /// Lines and iterates after the last saved step are cut off before the run continues, so the files of a run
-/// that was killed and continued hold each step once, with the bits of a run that was not; times differ.
+/// that was killed and continued hold each step once, with the bits of a run that was not; times differ. (A
+/// strategy that promises no exact answers can find other pairs after it was continued.)
 /// Calls done(record) after each step with its line. Throws io::InputError if a file cannot be read or
 /// written or belongs to a simulation with other options, and std::invalid_argument for options that name
-/// nothing.
+/// nothing; ConfigError as check_contact_strategy.
 SimulationResult simulate(const SimulationOptions& options,
                           const std::function<void(const nlohmann::json&)>& done = {});
 

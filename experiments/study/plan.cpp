@@ -132,6 +132,7 @@ Plan read_plan(const json& value, const std::string& place, const std::filesyste
   read_study(keys, common, folder);
   const auto studies = keys.list("studies");
   plan.targets = read_targets(keys.list("targets"), place);
+  keys.find("live");  // simulations, which `kbvh loop --plan` reads
   keys.finish();
   for (std::size_t i = 0; i < studies.size(); ++i) {
     JsonReader study_keys(studies[i], place + ": studies[" + std::to_string(i) + "]");

@@ -38,9 +38,9 @@ struct Plan {
 };
 
 /// Reads a plan. Its keys are those of a study and serve as defaults of the studies listed in "studies";
-/// without this list the plan is one study. RESULTS.md documents them all. `place` begins every message (the
-/// file's name), `folder` is the start of relative file names. Throws io::InputError on unknown keys and
-/// wrong values; ConfigError is left to `expand`.
+/// without this list the plan is one study; "live" is left to `kbvh loop`. RESULTS.md documents them all.
+/// `place` begins every message (the file's name), `folder` is the start of relative file names. Throws
+/// io::InputError on unknown keys and wrong values; ConfigError is left to `expand`.
 Plan read_plan(const nlohmann::json& plan, const std::string& place, const std::filesystem::path& folder);
 
 /// Read "params" and "builder" at any level of a plan. Throw io::InputError that begins with `place`.

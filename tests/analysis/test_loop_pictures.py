@@ -72,6 +72,14 @@ class TestReading(LoopCase):
         self.assertEqual(one.penetrations, 3)
         self.assertEqual([number for number, _ in one.frames], [0, 10, 20])
 
+    def test_the_strategy_that_found_the_pairs_is_named(self) -> None:
+        head = header()
+        self.assertEqual(loop_file.load(self.write("a", [step(1)], head=head)).detection, "refit")
+        head["options"] |= {"strategy": None}
+        self.assertEqual(loop_file.load(self.write("b", [step(1)], head=head)).detection, "refit")
+        head["options"] |= {"detection": "strategy", "strategy": "leaf_slabs", "params": {}}
+        self.assertEqual(loop_file.load(self.write("c", [step(1)], head=head)).detection, "leaf_slabs")
+
     def test_a_line_that_breaks_off_is_left_out(self) -> None:
         one = loop_file.load(self.write("a", [step(1)], tail='{"step": 2, "time'))
         self.assertEqual(len(one.steps), 1)

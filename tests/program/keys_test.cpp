@@ -164,7 +164,7 @@ TEST(Keys, AreTestedWithEveryKeyThatAPlanMayHave) {
   ASSERT_NE(begin, std::string::npos) << told;
   begin += before.size();
   const std::set<std::string> elsewhere{
-      "studies", "targets",            // these do not belong to a configuration
+      "studies", "targets", "live",    // these do not belong to a configuration
       "params",  "builder",            // in `strategies`; SeeEveryParameterOfEveryStrategy
       "rays",    "within",  "kernels"  // tests/program/asked.py
   };

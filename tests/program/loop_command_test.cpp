@@ -1,8 +1,10 @@
 // `kbvh loop` as a shell sees it: exit codes, files, a run that is killed, and a replay.
 #include <algorithm>
 #include <map>
+#include <set>
 
 #include "binary.hpp"
+#include "experiments/cli/loop_runs.hpp"
 
 namespace kbvh::experiments::loop_command_test {
 namespace {
@@ -54,6 +56,92 @@ TEST_F(Binary, LoopRunsRecordsAndReplays) {
   }
 }
 
+TEST_F(Binary, LoopComparesStrategies) {
+  const Outcome run = kbvh(cloth + "--steps 20 --strategies broad_phase,bottom_up,lbvh --out out");
+  EXPECT_EQ(run.code, 0) << run.err;
+  for (const char* word : {"of sphere", "over refit", "states", "broad_phase", "bottom_up", "lbvh", "equal"})
+    EXPECT_NE(run.out.find(word), std::string::npos) << word << "\n" << run.out;
+  EXPECT_EQ(run.out.find("differ at"), std::string::npos) << run.out;
+  const std::vector<json> own = records("out/broad_phase/loop.jsonl");
+  ASSERT_EQ(own.size(), 21u);
+  EXPECT_TRUE(own[0].at("options").at("strategy").is_null());
+  EXPECT_EQ(own[0].at("options").at("detection"), "refit");
+  for (const std::string& strategy : {std::string("bottom_up"), std::string("lbvh")}) {
+    const std::vector<json> found = records("out/" + strategy + "/loop.jsonl");
+    ASSERT_EQ(found.size(), 21u);
+    EXPECT_EQ(found[0].at("options").at("strategy"), strategy);
+    for (std::size_t i = 1; i < found.size(); ++i)
+      for (const char* key : {"state", "candidates", "questions", "penetrations"})
+        EXPECT_EQ(found[i].at(key), own[i].at(key)) << strategy << i << key;
+  }
+
+  // One alone, with a parameter, writes to the folder itself; the same command has nothing left to do.
+  const std::string one = cloth + "--steps 3 --strategies bottom_up --param threads=1 --out one";
+  for (int i = 0; i < 2; ++i) {
+    const Outcome alone = kbvh(one);
+    EXPECT_EQ(alone.code, 0) << alone.err;
+    EXPECT_NE(alone.out.find("pairs found by"), std::string::npos) << alone.out;
+  }
+  EXPECT_EQ(records("one/loop.jsonl").size(), 4u);
+
+  const Outcome lost = kbvh(cloth + "--steps 40 --strategies bottom_up,lbvh --lose 1");
+  EXPECT_EQ(lost.code, 1) << lost.out;
+  EXPECT_NE(lost.err.find("lbvh: "), std::string::npos) << lost.err;
+  EXPECT_NE(lost.err.find("penetrated"), std::string::npos) << lost.err;
+
+  // Of a family, those that do not suit are left out, with a reason.
+  const Outcome family = kbvh(cloth + "--steps 2 --strategies 'bottom_up,family:kinetic'");
+  EXPECT_EQ(family.code, 0) << family.err;
+  EXPECT_NE(family.err.find("needs to know the motion in advance"), std::string::npos) << family.err;
+}
+
+TEST_F(Binary, LoopRunsTheSimulationsOfAPlan) {
+  write_text(folder_ / "plan.json", R"({"name": "p", "scenes": "turning_box", "live": [
+    {"name": "cloth, small", "scene": "sphere", "triangles": 100, "steps": 3, "strategies": ["dirty_refit", "bottom_up"]},
+    {"scene": "sheets", "triangles": 60, "steps": 2}]})");
+  const Outcome run = kbvh("loop --plan plan.json --out live");
+  EXPECT_EQ(run.code, 0) << run.err;
+  EXPECT_NE(run.out.find("of cloth, small"), std::string::npos) << run.out;
+  EXPECT_NE(run.out.find("of sheets"), std::string::npos) << run.out;
+  EXPECT_EQ(records("live/cloth-small/dirty_refit/loop.jsonl").size(), 4u);
+  EXPECT_EQ(records("live/cloth-small/bottom_up/loop.jsonl").size(), 4u);
+  EXPECT_EQ(records("live/sheets/loop.jsonl").size(), 3u);
+  // Studies leave them alone.
+  const Outcome jobs = kbvh("run --plan plan.json --list-jobs");
+  EXPECT_EQ(jobs.code, 0) << jobs.err;
+  EXPECT_EQ(jobs.out.find("sheets"), std::string::npos) << jobs.out;
+
+  const std::map<std::string, std::string> wrong{
+      {R"({"scenes": "turning_box"})", "has no simulations"},
+      {R"({"live": []})", "live"},
+      {R"({"live": [{"scene": "cube"}]})", "there is no scene 'cube'"},
+      {R"({"live": [{"scenes": "sphere"}]})", "scenes"},
+      {R"({"live": [{"steps": 0}]})", "steps"},
+      {R"({"live": [{"strategies": ["kinetic_aabb"]}]})", "needs to know the motion in advance"},
+      {R"({"live": [{"params": {"threads": 2}}]})", "threads"},
+      {R"({"live": [{"scene": "knot"}, {"scene": "knot"}]})", "two simulations"}};
+  for (const auto& [plan, part] : wrong) {
+    write_text(folder_ / "wrong.json", plan);
+    const Outcome outcome = kbvh("loop --plan wrong.json");
+    EXPECT_EQ(outcome.code, 2) << plan << outcome.err;
+    EXPECT_NE(outcome.err.find(part), std::string::npos) << plan << "\n" << outcome.err;
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+  }
+}
+
+TEST(LoopPlan, HasSimulationsOfEveryScene) {
+  std::set<std::string> scenes;
+  for (const LiveStudy& study : load_live_studies(std::string(KBVH_PLANS) + "/loop.json", {})) {
+    scenes.insert(study.simulation.scene);
+    EXPECT_GE(study.finders.size(), 10u) << study.title;
+    EXPECT_EQ(study.finders.front().strategy.id, "");
+    EXPECT_TRUE(std::any_of(study.finders.begin(), study.finders.end(), [](const LiveFinder& finder) {
+      return finder.baseline;
+    })) << study.title;
+  }
+  EXPECT_EQ(scenes.size(), loop::scene_names().size());
+}
+
 TEST_F(Binary, LoopTellsPenetrationsByItsExitCode) {
   const Outcome run = kbvh(cloth + "--steps 40 --lose 1");
   EXPECT_EQ(run.code, 1) << run.out;
@@ -84,14 +172,23 @@ TEST_F(Binary, LoopGoesOnAfterItWasKilled) {
 }
 
 TEST_F(Binary, LoopRefusesInOneSentence) {
-  const std::map<std::string, std::string> cases{{"loop --scene cube", "there is no scene 'cube'"},
-                                                 {"loop --detect often", "there is no way to detect 'often'"},
-                                                 {"loop --record", "--record: needs --out"},
-                                                 {"loop --frames 3", "--frames: needs --out"},
-                                                 {"loop --play nothing", "nothing"},
-                                                 {"loop --play x --scene sphere", "--play"},
-                                                 {"loop --clip x", "--play"},
-                                                 {"loop --truth-every 3", "--play"}};
+  const std::map<std::string, std::string> cases{
+      {"loop --scene cube", "there is no scene 'cube'"},
+      {"loop --detect often", "there is no way to detect 'often'"},
+      {"loop --record", "--record: needs --out"},
+      {"loop --frames 3", "--frames: needs --out"},
+      {"loop --play nothing", "nothing"},
+      {"loop --play x --scene sphere", "--play"},
+      {"loop --clip x", "--play"},
+      {"loop --truth-every 3", "--play"},
+      {"loop --strategies kinetic_aabb", "'kinetic_aabb' needs to know the motion in advance"},
+      {"loop --strategies botom_up", "did you mean 'bottom_up'"},
+      {"loop --strategies bottom_up --detect kept", "--detect"},
+      {"loop --strategies bottom_up --param depth=2", "'depth'"},
+      {"loop --param threads=2", "goes with --strategies"},
+      {"loop --param threads", "expected key=value"},
+      {"loop --plan nothing.json", "nothing.json"},
+      {"loop --plan x --scene sphere", "--plan"}};
   for (const auto& [arguments, part] : cases) {
     const Outcome outcome = kbvh(arguments);
     EXPECT_EQ(outcome.code, 2) << arguments;
