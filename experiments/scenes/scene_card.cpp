@@ -171,6 +171,8 @@ std::uint64_t card_hash(const LoadedScene& scene) {
     hasher.list(mesh.keyframe_times);
     hasher.list(mesh.positions);
   }
+  if (!scene.vertices_of.empty()) hasher.list(scene.vertices_of);
+  if (scene.radius) hasher.bytes(&*scene.radius, sizeof(double));
   return hasher.value();
 }
 

@@ -416,8 +416,10 @@ LoadedScene load(const SceneSpec& spec, const MakeProgress& progress) {
   }
   std::vector<std::string> names;
   loaded.sources.assign(loaded.meshes.size(), "built-in scene " + spec.builtin);
+  const bool shares_vertices = has_elements(spec);
   for (const BodySpec& body : spec.bodies) {
-    loaded.vertices_of.push_back(body.elements ? body.elements->body : std::uint32_t(loaded.meshes.size()));
+    if (shares_vertices)
+      loaded.vertices_of.push_back(body.elements ? body.elements->body : std::uint32_t(loaded.meshes.size()));
     loaded.self.push_back(body.self);
     io::AnimatedMesh mesh;
     if (body.elements) {  // made below, from a mesh in its final order
