@@ -136,6 +136,8 @@ TYPED_TEST(WorldRadius, TakesTheVerticesThatMoved) {
   const Ids too_few{3};
   world.set_positions(1, std::span<const S>(later), too_few);
   world.advance(2);
+  std::vector<WorldPair> pairs;
+  world.pairs(pairs);
   ASSERT_TRUE(world.audit(0, audit));
   EXPECT_GT(audit.invalid, 0u);
   EXPECT_THROW(world.set_positions(1, std::span<const S>(later), Ids{81}), std::invalid_argument);
