@@ -115,7 +115,7 @@ def elements(body: Body, which: str, name: Optional[str] = None, self_pairs: boo
         corners = np.ravel(indices).astype(np.int64)
         if offsets is None and len(corners) % 3:
             raise ValueError(f"body '{body.name}': {len(corners)} indices do not make triangles")
-        begins = np.arange(0, len(corners) + 1, 3) if offsets is None else np.asarray(offsets, dtype=np.int64)
+        begins: npt.NDArray[Any] = np.arange(0, len(corners) + 1, 3) if offsets is None else np.asarray(offsets, dtype=np.int64)
         following = np.arange(1, len(corners) + 1)
         following[begins[1:] - 1] = begins[:-1]
         sides = np.stack([corners, corners[following]], axis=1)
@@ -190,7 +190,7 @@ class Scene:
 
 def scene(description: Union[str, Mapping[str, Any]], folder: PathLike = ".", **keys: Any) -> Scene:
     """Makes a scene from the description that a plan has (experiments/RESULTS.md): the name of a built-in scene with its keys
-    (triangles, keyframes, seed, obstacle, order, self, radius), or bodies from files, by formula, and of elements of other bodies.
+    (triangles, keyframes, seed, obstacle, order, self, radius), or bodies from files, by formula, and of elements of others.
     Relative files are relative to `folder`. Raises InputError.
 
     >>> kbvh.scene("tablecloth", triangles=200, keyframes=2).bodies[0].positions.shape
