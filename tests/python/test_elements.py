@@ -109,7 +109,9 @@ class Candidates(unittest.TestCase):
 
     def test_of_vertices_that_moved(self):
         v, _, faces = sheet(10, 1)
-        world = kbvh.World(elements_of(v, faces), "dirty_refit", precision="float64", radius=0.125)
+        # A tree of many nodes: where most of them hold vertices that moved, all are refitted.
+        many = {"width": 2, "leaf_size": 1}
+        world = kbvh.World(elements_of(v, faces), "dirty_refit", precision="float64", radius=0.125, topology=many)
         w = v.copy()
         w[[7, 50]] = sheet(10, 2)[0][[7, 50]]
         world.set_positions(0, w, moved=[7, 50])
