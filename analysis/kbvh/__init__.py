@@ -18,7 +18,7 @@ from . import results
 from .broad_phase import BroadPhase
 from .conformance import Verdict, check, small_scenes
 from .own import BodyView, Parameter, SceneView, Strategy, register
-from .scenes import Body, PlanChange, Scene, builtin_scenes, load, scene, shapes
+from .scenes import Body, PlanChange, Scene, builtin_scenes, elements, load, scene, shapes
 from .strategies import counters, describe, strategies
 from .studies import Run, plan, run
 from .trees import Tree, overlapping, primitive_bounds, refit
@@ -26,7 +26,7 @@ from .world import Audit, Hierarchy, Step, World, padded
 
 __all__ = [
     "Audit", "Body", "BodyView", "BroadPhase", "ConfigError", "Hierarchy", "InputError", "KbvhError", "Parameter", "PlanChange", 
-    "Run", "Scene", "SceneView", "Step", "Strategy", "Tree", "Verdict", "World", "builtin_scenes", "check", "counters", "describe", "load",
-    "overlapping", "padded", "plan", "primitive_bounds", "refit", "register", "results", "run", "scene", "shapes",
+    "Run", "Scene", "SceneView", "Step", "Strategy", "Tree", "Verdict", "World", "builtin_scenes", "check", "counters", "describe",
+    "elements", "load", "overlapping", "padded", "plan", "primitive_bounds", "refit", "register", "results", "run", "scene", "shapes",
     "small_scenes", "strategies",
 ]  # fmt: skip

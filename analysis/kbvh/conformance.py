@@ -109,6 +109,8 @@ def _unsuitable(strategy: dict[str, Any], play: Scene, precision: str) -> str:
         return f"it does not exist in {precision}"
     if any(a == b for a, b in play.pairs_asked() or ()) and "self_pairs" not in strategy["abilities"]:
         return "it does not answer pairs within a body"
+    if play.radius is not None:
+        return "" if "control_nets" in strategy["primitives"] else "it does not take a radius"
     others = [body.shape for body in play.bodies if body.shape not in strategy["primitives"]]
     return f"it does not take {others[0]}" if others else ""
 

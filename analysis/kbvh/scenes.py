@@ -33,13 +33,20 @@ class Body:
     whatever its first corner; from then on it is the union of these triangles. Arrays are used as they are: nothing is copied
     before a world is made.
 
+    `over` is another body whose vertices this one consists of, as the edges of a mesh do: it then has the positions, times and
+    motion of that body, which comes before it in a scene. Primitives with a common vertex are no pair, also in two such bodies.
+    `elements` makes such bodies.
+
     >>> import numpy as np
     >>> kbvh.Body([[0, 1, 2]], np.zeros((2, 3, 3)), times=[0, 1]).keyframes
     2
+    >>> face = kbvh.Body([[0, 1, 2]], np.eye(3))
+    >>> kbvh.Body([0, 1], offsets=[0, 2], over=face, name="edge").vertices
+    3
     """
 
     indices: npt.ArrayLike
-    positions: npt.ArrayLike
+    positions: npt.ArrayLike = ()
     times: Optional[npt.ArrayLike] = None
     offsets: Optional[npt.ArrayLike] = None
     shape: str = "polygons"
@@ -47,8 +54,16 @@ class Body:
     known: bool = True
     #: Whether pairs within the body are requested, too.
     self_pairs: bool = False
+    #: The body whose vertices this one consists of; None: its own.
+    over: Optional[Body] = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
+        if self.over is not None:
+            if not isinstance(self.over, Body):
+                raise TypeError(f"body '{self.name}': over is a Body, not {type(self.over).__name__}")
+            if np.size(self.positions) or self.times is not None or not self.known:
+                raise ValueError(f"body '{self.name}': positions, times and known are those of '{self.over.name}'")
+            self.positions, self.times, self.known = self.over.positions, self.over.times, self.over.known
         self.positions = np.asarray(self.positions)
         if self.positions.ndim not in (2, 3) or self.positions.shape[-1] != 3:
             raise ValueError(
@@ -77,6 +92,40 @@ class Body:
         return int(np.size(self.indices)) // 3 if self.offsets is None else int(np.size(self.offsets)) - 1
 
 
+def elements(body: Body, which: str, name: Optional[str] = None, self_pairs: bool = False) -> Body:
+    """Returns the "vertices", "edges" or "faces" of a body as a body over its vertices. Vertices and faces keep their numbers;
+    edges are the sides of its polygons, each once, in the order of their larger and then of their smaller vertex.
+
+    >>> import numpy as np
+    >>> cloth = kbvh.Body([[0, 1, 2], [2, 1, 3]], np.zeros((4, 3)), name="cloth")
+    >>> kbvh.elements(cloth, "edges").indices.reshape(-1, 2).tolist()
+    [[0, 1], [0, 2], [1, 2], [1, 3], [2, 3]]
+    >>> world = kbvh.World([cloth, kbvh.elements(cloth, "vertices")], "bottom_up", radius=0.5)
+    >>> sorted((int(pair["primitive_a"]), int(pair["primitive_b"])) for pair in world.pairs())
+    [(0, 3), (1, 0)]
+    """
+    if which not in ("vertices", "edges", "faces"):
+        raise ValueError(f"elements are vertices, edges or faces, not '{which}'")
+    if which != "vertices" and body.shape != "polygons":
+        raise ValueError(f"body '{body.name}' consists of {body.shape.replace('_', ' ')} and has no {which}")
+    indices, offsets = body.indices, body.offsets
+    if which == "vertices":
+        indices, offsets = np.arange(body.vertices, dtype=np.uint32), np.arange(body.vertices + 1, dtype=np.uint32)
+    if which == "edges":
+        corners = np.ravel(indices).astype(np.int64)
+        if offsets is None and len(corners) % 3:
+            raise ValueError(f"body '{body.name}': {len(corners)} indices do not make triangles")
+        begins: npt.NDArray[Any] = np.arange(0, len(corners) + 1, 3) if offsets is None else np.asarray(offsets, dtype=np.int64)
+        following = np.arange(1, len(corners) + 1)
+        following[begins[1:] - 1] = begins[:-1]
+        sides = np.stack([corners, corners[following]], axis=1)
+        sides = np.sort(sides[sides[:, 0] != sides[:, 1]], axis=1)
+        larger_first = np.unique(sides[:, ::-1], axis=0)
+        indices = larger_first[:, ::-1].astype(np.uint32).ravel()
+        offsets = np.arange(0, 2 * len(larger_first) + 1, 2, dtype=np.uint32)
+    return Body(indices, offsets=offsets, name=f"{body.name}-{which}" if name is None else name, self_pairs=self_pairs, over=body)
+
+
 @dataclass
 class PlanChange:
     """New plans of some vertices of a body: from their position at `time` on straight lines through `positions`
@@ -92,7 +141,10 @@ class PlanChange:
 
 @dataclass
 class Scene:
-    """Bodies, and the pairs of bodies that are asked about: all pairs with a moving body, unless `pairs` lists them."""
+    """Bodies, and the pairs of bodies that are asked about: all pairs with a moving body, unless `pairs` lists them.
+
+    With a `radius` all pairs are those of boxes grown by half of it: of two primitives at a distance of at most `radius` none is
+    missing, as a broad phase has to find them. 0 asks for overlaps of boxes, None for exact intersections."""
 
     bodies: Sequence[Body]
     pairs: Optional[Sequence[tuple[int, int]]] = None
@@ -100,6 +152,7 @@ class Scene:
     notes: Sequence[str] = ()
     #: Whether plans change at run time (see `script`).
     changes: bool = False
+    radius: Optional[float] = None
     _source: Optional[tuple[str, str]] = field(default=None, repr=False)
 
     @property
@@ -137,20 +190,29 @@ class Scene:
 
 def scene(description: Union[str, Mapping[str, Any]], folder: PathLike = ".", **keys: Any) -> Scene:
     """Makes a scene from the description that a plan has (experiments/RESULTS.md): the name of a built-in scene with its keys
-    (triangles, keyframes, seed, obstacle, order, self), or bodies from files and by formula. Relative files are relative to
-    `folder`. Raises InputError.
+    (triangles, keyframes, seed, obstacle, order, self, radius), or bodies from files, by formula, and of elements of others.
+    Relative files are relative to `folder`. Raises InputError.
 
     >>> kbvh.scene("tablecloth", triangles=200, keyframes=2).bodies[0].positions.shape
     (2, 121, 3)
     >>> [body.name for body in kbvh.scene({"bodies": [{"shape": "sphere", "triangles": 80}]}).bodies]
     ['icosphere-80']
+    >>> mesh = {"shape": "sphere", "triangles": 80, "name": "ball"}
+    >>> ball = kbvh.scene({"bodies": [mesh, {"elements": "edges", "of": "ball"}], "radius": 0.1})
+    >>> ball.bodies[1].over is ball.bodies[0], ball.bodies[1].primitives, ball.radius
+    (True, 120, 0.1)
     """
     if isinstance(description, str):
         description = {"builtin": description}
     source = (json.dumps({**description, **keys}, default=os.fspath), os.fspath(folder))
     made = _core.make_scene(*source, "", 0)
-    bodies = [Body(**body) for body in made["bodies"]]
-    return Scene(bodies, name=made["name"], notes=made["notes"], changes=made["changes"], _source=source)
+    bodies: list[Body] = []
+    for body in made["bodies"]:
+        over = body.pop("over", None)
+        bodies.append(Body(**body, over=None if over is None else bodies[over]))
+    return Scene(
+        bodies, made["pairs"], made["name"], made["notes"], changes=made["changes"], radius=made["radius"], _source=source
+    )
 
 
 def load(file: PathLike, motion: Optional[PathLike] = None, **keys: Any) -> Body:

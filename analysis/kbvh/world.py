@@ -56,6 +56,14 @@ def padded(positions: npt.ArrayLike, precision: str = "float32") -> Array:
     return out
 
 
+def _number_of(body: Body, bodies: Sequence[Body]) -> int:
+    """Returns the number of a body, over whose vertices another one is, among those that come before that one."""
+    for i, one in enumerate(bodies):
+        if one is body:
+            return i
+    raise ValueError(f"the body '{body.name}', over whose vertices it is, must come before it in the scene")
+
+
 @dataclass
 class Audit:
     """What an audit finds. `protrusion` is the largest distance of a vertex from a bound above it (0: all bounds are valid), in
@@ -97,6 +105,11 @@ class World:
     width, leaf_size), `t` the time of the start; by default that of the first keyframe. Input in the world's precision (float32
     or float64) and in C order is read where it lies; the world keeps its own copy of keyframes.
 
+    `radius` makes all pairs those of boxes grown by half of it, so that two primitives at a distance of at most `radius` are
+    always a pair (`Scene` says more); by default it is the scene's. Only strategies that take control nets play such a world. It
+    finds no contacts, answers neither `hits` nor `within`, changes neither plans nor geometry, and copies all positions that are
+    set. Vertex v is two in `realisers` and in events: the corners 2 * v (lower) and 2 * v + 1 (upper) of its box.
+
     Raises ValueError or TypeError for wrong input (ConfigError for a strategy or parameter), RuntimeError for calls in the wrong
     order and for abilities that the strategy lacks; nothing has changed then. Ctrl-C ends a long call at its next frame.
 
@@ -116,17 +129,26 @@ class World:
         precision: str = "float32",
         t: Optional[float] = None,
         topology: Optional[Words] = None,
+        radius: Optional[float] = None,
     ) -> None:
         self.scene = scene if isinstance(scene, Scene) else Scene(list(scene))
         self._core = _core.World(precision)
-        for body in self.scene.bodies:
+        for i, body in enumerate(self.scene.bodies):
             times = None if not body.known else [0.0] if body.times is None else body.times
             try:
-                self._core.add_body(body.name, body.indices, body.offsets, body.shape, times, body.positions)
+                if body.over is None:
+                    self._core.add_body(body.name, body.indices, body.offsets, body.shape, times, body.positions)
+                else:
+                    over = _number_of(body.over, self.scene.bodies[:i])
+                    self._core.add_body_over(over, body.name, body.indices, body.offsets, body.shape)
             except ValueError as reason:
                 if f"'{body.name}'" in str(reason):
                     raise
                 raise type(reason)(f"body '{body.name}': {reason}") from None
+        if radius is None:
+            radius = self.scene.radius
+        if radius is not None:
+            self._core.set_radius(radius)
         for a, b in self.scene.pairs_asked() or ():
             self._core.add_pair(a, b)
         if strategy is not None:

@@ -12,7 +12,7 @@ from typing import Any, Union
 
 #: The parts of the page, in the order of use; every public name appears in one of them.
 PARTS = {
-    "Scenes": ["scene", "builtin_scenes", "load", "shapes", "Scene", "Body", "PlanChange"],
+    "Scenes": ["scene", "builtin_scenes", "load", "shapes", "Scene", "Body", "elements", "PlanChange"],
     "Playing a scene": ["World", "Hierarchy", "Audit", "Step", "padded", "counters"],
     "Strategies": ["strategies", "describe"],
     "The broad phase of a simulator": ["BroadPhase"],

@@ -69,6 +69,8 @@ void StrategyBroadPhase<S>::start(const MatrixView<S>& v0, const MatrixView<S>& 
   for (std::unique_ptr<detail::StrategySearch<S>>& search : searches_) search.reset();
   for (std::size_t element = 0; element < element_kinds; ++element)
     nets_.lists[element] = over_corners(elements.lists[element]);
+  elements_ = std::move(elements);
+  filter_.clear();
   vertices_ = vertices;
   half_radius_ = half;
   time_ = 0;
@@ -82,7 +84,7 @@ void StrategyBroadPhase<S>::start(const MatrixView<S>& v0, const MatrixView<S>& 
 
 template <class S>
 void StrategyBroadPhase<S>::take(const MatrixView<S>& v0, const MatrixView<S>& v1) {
-  if (!built_) throw std::logic_error("a broad phase knows no mesh before build()");
+  built();
   check(v0, v1, vertices_);
   time_ += 1;
   write_boxes(v0, v1);
@@ -109,7 +111,7 @@ void StrategyBroadPhase<S>::write_boxes(const MatrixView<S>& v0, const MatrixVie
 
 template <class S>
 void StrategyBroadPhase<S>::detect(CandidateKind kind, CandidateBuffer& out) {
-  if (!built_) throw std::logic_error("a broad phase knows no mesh before build()");
+  built();
   const Element first = first_element(kind), second = second_element(kind);
   std::unique_ptr<detail::StrategySearch<S>>& search = searches_[std::size_t(kind)];
   if (search == nullptr) {
@@ -132,6 +134,47 @@ void StrategyBroadPhase<S>::detect(CandidateKind kind, CandidateBuffer& out) {
   std::transform(search->pairs.begin(), search->pairs.end(), out.begin(), [](const PrimitivePair& pair) {
     return Candidate{pair.primitive_a, pair.primitive_b};
   });
+  if (!filter_.looks_at(kind)) return;
+  filter_.prepare(elements_);
+  out.resize(filter_.keep(elements_, kind, {out.data(), out.size()}));
+}
+
+template <class S>
+const Elements& StrategyBroadPhase<S>::built() const {
+  if (!built_) throw std::logic_error("a broad phase knows no mesh before build()");
+  return elements_;
+}
+
+template <class S>
+void StrategyBroadPhase<S>::set_groups(Element element, std::span<const GroupMask> groups) {
+  filter_.set_groups(built(), element, groups);
+}
+
+template <class S>
+void StrategyBroadPhase<S>::set_vertex_groups(std::span<const GroupMask> groups) {
+  filter_.set_vertex_groups(built(), groups);
+}
+
+template <class S>
+void StrategyBroadPhase<S>::exclude(CandidateKind kind, std::span<const Candidate> pairs) {
+  filter_.exclude(built(), kind, pairs);
+}
+
+template <class S>
+void StrategyBroadPhase<S>::exclude_rings(std::uint32_t rings) {
+  built();
+  filter_.exclude_rings(rings);
+}
+
+template <class S>
+void StrategyBroadPhase<S>::keep_only(PairFunction function) {
+  built();
+  filter_.set_function(std::move(function));
+}
+
+template <class S>
+void StrategyBroadPhase<S>::clear_filters() {
+  filter_.clear();
 }
 
 template <class S>

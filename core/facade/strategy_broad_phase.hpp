@@ -4,11 +4,13 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "core/base/unfilled_array.hpp"
 #include "core/broad_phase/elements.hpp"
+#include "core/broad_phase/pair_filter.hpp"
 
 namespace kbvh {
 
@@ -24,8 +26,8 @@ struct StrategySearch;
 ///
 /// Vertices, edges and faces are bodies over one vertex set, whose vertices are the two corners of each
 /// vertex's box: it encloses the vertex, or its motion, grown by radius / 2 and rounded outward as in
-/// BroadPhase. Candidates of an exact strategy are therefore the same set as those of BroadPhase without
-/// filters, in another order.
+/// BroadPhase. Candidates of an exact strategy are therefore the same set as those of BroadPhase, in another
+/// order. Filters sift what the strategy found: they do not shorten its search.
 ///
 /// S is float or double. Positions, indices and errors are as in BroadPhase. What a strategy allocates is its
 /// own matter.
@@ -61,6 +63,15 @@ class StrategyBroadPhase {
   /// if the strategy does not suit, and std::logic_error before `build`.
   void detect(CandidateKind kind, CandidateBuffer& out);
 
+  /// Filter candidates as the functions of BroadPhase with these names do, until the next `build`. Throw as
+  /// those do, and std::logic_error before `build`; the next search throws what their functions throw.
+  void set_groups(Element element, std::span<const GroupMask> groups);
+  void set_vertex_groups(std::span<const GroupMask> groups);
+  void exclude(CandidateKind kind, std::span<const Candidate> pairs);
+  void exclude_rings(std::uint32_t rings);
+  void keep_only(PairFunction function);
+  void clear_filters();
+
   const std::string& strategy() const { return strategy_; }
   /// Returns the memory of the boxes, the strategy's structures and the lists, in bytes.
   std::size_t bytes() const;
@@ -69,11 +80,15 @@ class StrategyBroadPhase {
   void start(const MatrixView<S>& v0, const MatrixView<S>& v1, Elements elements, double radius);
   void take(const MatrixView<S>& v0, const MatrixView<S>& v1);
   void write_boxes(const MatrixView<S>& v0, const MatrixView<S>& v1);
+  /// Returns the elements. Throws std::logic_error before `build`.
+  const Elements& built() const;
 
   std::string strategy_;
   std::map<std::string, std::string> params_, topology_;
   bool built_ = false;
-  Elements nets_;  ///< over corners: vertex v has the corners 2 v and 2 v + 1
+  Elements elements_;  ///< over vertices
+  Elements nets_;      ///< over corners: vertex v has the corners 2 v and 2 v + 1
+  PairFilter filter_;
   std::uint32_t vertices_ = 0;
   S half_radius_ = 0;
   double time_ = 0;         ///< number of updates since `build`

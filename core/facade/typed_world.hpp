@@ -15,6 +15,7 @@
 #include "core/facade/conversions.hpp"
 #include "core/motion/admissible.hpp"
 #include "core/scene/cut_polygons.hpp"
+#include "core/scene/with_radius.hpp"
 
 namespace kbvh::facade {
 
@@ -37,12 +38,14 @@ inline Contestant contestant_of(const std::string& strategy, const std::map<std:
 template <class S>
 struct TypedWorld {
   struct Copies {
-    std::vector<S> array[2];
+    std::vector<S> array[2];     ///< [vertex][3] and one more, as the session reads them
+    std::vector<S> vertices[2];  ///< with a radius, where `array` has corners: [vertex][3]
   };
   Scene<S> scene;
+  std::optional<double> radius;      ///< of the scene that is played: its vertices are then corners
   std::unique_ptr<Scene<S>> played;  ///< the session refers to it
   std::unique_ptr<Session<S>> started;
-  std::vector<Copies> given;                        ///< [body]
+  std::vector<Copies> given;                        ///< [body], of the first body over its vertices
   mutable std::uint64_t fetched_for_questions = 0;  ///< positions that are no work of the strategy
   PhaseTimes ignored;
   PairBuffer pairs, ended;
@@ -53,6 +56,8 @@ struct TypedWorld {
   std::vector<Ball<S>> balls;
   BallHits ball_hits;
   EventDescription<S> done;
+  std::vector<S> evaluated;                  ///< of one body, with a radius: see `vertex_positions`
+  std::vector<std::uint32_t> moved_corners;  ///< with a radius, of the vertices that moved
 
   void check_not_started() const {
     if (started) throw std::logic_error("the world has started, so its scene is fixed");
@@ -67,18 +72,30 @@ struct TypedWorld {
     return *started;
   }
   double time() const { return session().playback().time(); }
+  /// Throws std::logic_error if the world has a radius; `lacks` is what it then lacks, as a verb and nouns.
+  void check_no_radius(const char* lacks) const {
+    if (radius) throw std::logic_error(std::string("a world with a radius consists of boxes and ") + lacks);
+  }
+  /// Throws ConfigError if the world has a radius and the strategy takes no boxes of corners.
+  void check_takes_radius(const Info& info) const {
+    const bool takes = std::find(info.primitives.begin(), info.primitives.end(),
+                                 PrimitiveKind::control_nets) != info.primitives.end();
+    if (radius && !takes)
+      throw ConfigError("'" + info.id + "' takes no radius, because it takes no control nets");
+  }
   EventSource<S>& events() const {
     EventSource<S>* const source = session().strategy().events();
     if (source == nullptr) throw std::logic_error("'" + session().info().id + "' does not declare events");
     return *source;
   }
 
-  /// Copies the scene as it is played: the added bodies stay if a strategy does not suit them.
+  /// Copies the scene as it is played, with the radius: the added bodies stay if a strategy does not suit
+  /// them.
   Scene<S> whole_scene() const {
     Scene<S> whole = scene;
     if (whole.pairs.empty()) whole.pairs = all_pairs(whole.bodies);
     validate(whole);
-    return whole;
+    return radius ? with_radius(whole, *radius) : whole;
   }
 
   /// Returns the positions of a body, evaluated for a question.
@@ -88,6 +105,28 @@ struct TypedWorld {
     playback.fetch_all(body);
     fetched_for_questions += playback.fetched() - before;
     return playback.positions(body);
+  }
+
+  /// Returns the plans of a body's vertices, with changes.
+  const FlightPlans<S>& vertex_plans(std::uint32_t body) const {
+    const Playback<S>& playback = session().playback();
+    return radius ? scene.bodies[body].plans : playback.plans(body);
+  }
+  /// Returns the positions of a body's vertices at the current time where the played scene has corners of
+  /// boxes. Valid until the next call, and until positions are set.
+  const S* vertex_positions(std::uint32_t body) {
+    const Playback<S>& playback = session().playback();
+    const FlightPlans<S>& plans = scene.bodies[body].plans;
+    if (plans.is_handed_in()) {
+      const Copies& copies = given[scene.first_of_set(body)];
+      for (std::size_t i = 0; i < 2; ++i)
+        if (!copies.array[i].empty() && playback.positions(body) == copies.array[i].data())
+          return copies.vertices[i].data();
+      return plans.keyframe(0);
+    }
+    evaluated.resize(std::size_t(3) * plans.vertex_count() + 1);
+    plans.evaluate(playback.time(), evaluated.data());
+    return evaluated.data();
   }
 
   template <class T>
@@ -129,12 +168,18 @@ struct TypedWorld {
     return add_body_over(scene, body, name, std::move(alone.bodies[0].primitives));
   }
 
+  void set_radius(double value) {
+    check_not_started();
+    write_corners<S>(nullptr, 0, value, nullptr);  // throws for a radius that is none
+    radius = value;
+  }
+
   template <class T>
   void set(std::uint32_t body, std::span<const T> positions,
            std::optional<std::span<const std::uint32_t>> moved = {}) {
     check_body(body);
     session();
-    const Body<S>& target = played->bodies[body];
+    const Body<S>& target = scene.bodies[body];
     if (!target.plans.is_handed_in())
       throw std::logic_error("the motion of body '" + target.name + "' is known; positions cannot be set");
     const std::size_t size = std::size_t(3) * target.plans.vertex_count();
@@ -152,21 +197,37 @@ struct TypedWorld {
           throw std::invalid_argument("vertex " + std::to_string(vertex) + " moved, but body '" +
                                       target.name + "' has " + std::to_string(size / 3));
     give(body, positions, size);
+    if (moved && radius) {
+      moved_corners.clear();
+      for (const std::uint32_t vertex : *moved) {
+        moved_corners.push_back(2 * vertex);
+        moved_corners.push_back(2 * vertex + 1);
+      }
+      moved = moved_corners;
+    }
     for (std::uint32_t other = 0; other < played->bodies.size(); ++other)
       if (played->same_vertices(body, other)) tell_moved(session().strategy(), other, moved);
   }
   template <class T>
   void give(std::uint32_t body, std::span<const T> positions, std::size_t size) {
     if constexpr (std::is_same_v<S, T>)
-      if (positions.size() == size + 1) {
+      if (positions.size() == size + 1 && !radius) {
         session().hand_in(body, positions.data());
         return;
       }
     // Two alternating copies: a sweep begins at the positions that the motion view still shows.
-    std::vector<S>* const copies = given[body].array;
-    std::vector<S>& copy = copies[session().playback().positions(body) == copies[0].data() ? 1 : 0];
-    copy.resize(size + 1);
-    for (std::size_t i = 0; i < size; ++i) copy[i] = S(positions[i]);
+    Copies& copies = given[scene.first_of_set(body)];
+    const std::size_t unread = session().playback().positions(body) == copies.array[0].data() ? 1 : 0;
+    std::vector<S>& copy = copies.array[unread];
+    if (radius) {
+      std::vector<S>& of_vertices = copies.vertices[unread];
+      of_vertices.assign(positions.begin(), positions.begin() + std::ptrdiff_t(size));
+      copy.resize(2 * size + 1);
+      write_corners(of_vertices.data(), std::uint32_t(size / 3), *radius, copy.data());
+    } else {
+      copy.resize(size + 1);
+      for (std::size_t i = 0; i < size; ++i) copy[i] = S(positions[i]);
+    }
     session().hand_in(body, copy.data());
   }
 };

@@ -55,6 +55,10 @@ std::uint32_t World::add_body_over(std::uint32_t body, const std::string& name,
   return in_scalar([&](auto& world) { return world.add_over(body, name, connectivity); });
 }
 
+void World::set_radius(double radius) {
+  in_scalar([&](auto& world) { world.set_radius(radius); });
+}
+
 void World::add_pair(std::uint32_t body_a, std::uint32_t body_b) {
   in_scalar([&](auto& world) {
     world.check_not_started();
@@ -74,6 +78,7 @@ void World::start(const std::string& strategy, const std::map<std::string, std::
   in_scalar([&]<class S>(TypedWorld<S>& world) {
     world.check_not_started();
     const Contestant contestant = contestant_of(strategy, params, topology);
+    world.check_takes_radius(contestant.entry->info);
     world.played = std::make_unique<Scene<S>>(world.whole_scene());
     auto session = std::make_unique<Session<S>>(*world.played, contestant);
     session->reset(t);
@@ -115,6 +120,7 @@ void World::set_positions(std::uint32_t body, std::span<const double> positions,
 
 void World::change_plans(const std::vector<WorldPlan>& plans) {
   in_scalar([&]<class S>(TypedWorld<S>& world) {
+    world.check_no_radius("takes no changes of plans");
     std::vector<PlanChange<S>> changes;
     for (const WorldPlan& plan : plans) {
       PlanChange<S>& change = changes.emplace_back();
@@ -133,6 +139,7 @@ void World::change_plans(const std::vector<WorldPlan>& plans) {
 void World::change_geometry(const WorldEdit& edit) {
   in_scalar([&]<class S>(TypedWorld<S>& world) {
     world.session();
+    world.check_no_radius("takes no changes of geometry");
     GeometryChange<S> change;
     for (const WorldEdit::Vertex& vertex : edit.vertices) {
       world.check_body(vertex.body);
@@ -186,6 +193,7 @@ void World::spans(double t, std::vector<WorldSpan>& out) {
 }
 void World::contacts(double t, std::vector<WorldContact>& out) {
   in_scalar([&](auto& world) {
+    world.check_no_radius("finds no contacts");
     world.contacts.clear();
     world.session().contacts(t, world.contacts, world.ignored);
     out.clear();
@@ -199,6 +207,7 @@ double World::next_knot() const {
 }
 void World::hits(WorldRayQuery query, std::span<const WorldRay> rays, std::vector<WorldHit>& out) {
   in_scalar([&]<class S>(TypedWorld<S>& world) {
+    world.check_no_radius("answers no rays");
     world.rays.clear();
     for (const WorldRay& ray : rays) world.rays.push_back(typed<S>(ray));
     world.hits.resize(rays.size());
@@ -211,6 +220,7 @@ void World::hits(WorldRayQuery query, std::span<const WorldRay> rays, std::vecto
 
 void World::within(std::span<const WorldBall> balls, std::vector<WorldBallHit>& out) {
   in_scalar([&]<class S>(TypedWorld<S>& world) {
+    world.check_no_radius("answers no balls");
     world.balls.clear();
     for (const auto& [centre, radius] : balls)
       world.balls.push_back({{S(centre[0]), S(centre[1]), S(centre[2])}, S(radius)});
@@ -226,11 +236,11 @@ void World::positions(std::uint32_t body, std::vector<double>& out) {
   in_scalar([&]<class S>(TypedWorld<S>& world) {
     world.check_body(body);
     Playback<S>& playback = world.session().playback();
-    const FlightPlans<S>& plans = playback.plans(body);
+    const FlightPlans<S>& plans = world.vertex_plans(body);
     const std::size_t size = std::size_t(3) * plans.vertex_count();
-    const S* numbers = playback.positions(body);
+    const S* numbers = world.radius ? world.vertex_positions(body) : playback.positions(body);
     std::vector<S> evaluated;
-    if (!plans.is_handed_in() && !playback.all_current(body)) {
+    if (!world.radius && !plans.is_handed_in() && !playback.all_current(body)) {
       evaluated.resize(size + 1);
       plans.evaluate(playback.time(), evaluated.data());
       numbers = evaluated.data();
@@ -241,7 +251,7 @@ void World::positions(std::uint32_t body, std::vector<double>& out) {
 void World::positions(std::uint32_t body, double t, std::vector<double>& out) const {
   in_scalar([&]<class S>(const TypedWorld<S>& world) {
     world.check_body(body);
-    const FlightPlans<S>& plans = world.session().playback().plans(body);
+    const FlightPlans<S>& plans = world.vertex_plans(body);
     if (plans.is_handed_in())
       throw std::logic_error("the motion of body '" + world.scene.bodies[body].name +
                              "' is not known, so it has no positions at t = " + number_text(t));
@@ -327,9 +337,9 @@ std::vector<WorldCounter> World::counters() const {
 WorldPositions World::current_positions(std::uint32_t body) {
   return in_scalar([&]<class S>(TypedWorld<S>& world) -> WorldPositions {
     world.check_body(body);
-    const S* const numbers = world.fetched(body);
-    return {sizeof(S) == 4 ? Precision::float32 : Precision::float64,
-            world.session().playback().plans(body).vertex_count(), numbers};
+    const S* const numbers = world.radius ? world.vertex_positions(body) : world.fetched(body);
+    return {sizeof(S) == 4 ? Precision::float32 : Precision::float64, world.vertex_plans(body).vertex_count(),
+            numbers};
   });
 }
 
@@ -364,6 +374,7 @@ WorldVerdict World::verify(const std::string& strategy, std::span<const double> 
         throw std::invalid_argument("body '" + body.name +
                                     "' cannot be verified: its positions are set frame by frame");
     const Contestant contestant = contestant_of(strategy, params, topology);
+    world.check_takes_radius(contestant.entry->info);
     const Scene<S> scene = world.whole_scene();
     Session<S> session(scene, contestant);
     Oracle<S> oracle(scene);

@@ -273,6 +273,13 @@ class World {
   /// motion and vertex ids are the same. Positions, plans and vertices change at run time for one of these
   /// bodies, and so for all. Primitives with a common vertex are no pair. Returns the new body's id.
   std::uint32_t add_body_over(std::uint32_t body, const std::string& name, const Connectivity& connectivity);
+  /// Makes all pairs those of boxes, grown by radius / 2 on each side and rounded outward: two primitives at
+  /// a distance of at most `radius` are always a pair, others whose grown boxes overlap are pairs, too. Only
+  /// strategies that take control nets play such a world, which finds no contacts, answers neither rays nor
+  /// balls, and changes neither plans nor geometry. Each vertex v is two in `realisers` and in events: the
+  /// corners 2 v (lower) and 2 v + 1 (upper) of its box; positions are those of the vertices. Throws
+  /// std::invalid_argument for a radius that is negative or no admissible length.
+  void set_radius(double radius);
   /// Requests pairs of these two bodies, or within one body if both are the same. Without any such call, the
   /// pairs of all bodies are requested, and no pairs within a body.
   void add_pair(std::uint32_t body_a, std::uint32_t body_b);

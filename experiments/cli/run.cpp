@@ -24,7 +24,8 @@ constexpr const char* run_examples = R"(Examples:
   kbvh run --scene waving_sheet --strategies bottom_up,rebuild --leaf-size 1,4 --scalar float,double
 A body is a file (.obj .ply .gltf .glb, or a folder of numbered frames) or a shape, followed by key=value pairs
 separated by commas: motion clip fps weld=false (files), name scale rotate=axis:degrees translate=x:y:z as=triangles|points
-curves=smooth|lines (all; cubics or lines through the keyframes); `kbvh list` shows the shapes. Polygons of more than three corners are cut into triangles once, at the first keyframe,
+curves=smooth|lines (all; cubics or lines through the keyframes); `kbvh list` shows the shapes. elements=edges,of=NAME is a body
+of the vertices, edges or faces of another one, over the same vertices. Polygons of more than three corners are cut into triangles once, at the first keyframe,
 whatever their first corner; from then on a polygon is the union of these triangles.
 A clip is timed from its first frame on: positions, the strategy's reset and its first answer count. Every contestant
 is verified, replayed, and then played in rounds, each in an order of its own, until the intervals of all ratios are

@@ -40,12 +40,14 @@ json scene_record(const Scene<S>& scene, const LoadedScene& loaded, std::uint32_
     const Body<S>& body = scene.bodies[i];
     bodies.push_back({{"name", body.name},
                       {"primitives", body.primitives.count()},
-                      {"vertices", body.plans.vertex_count()},
+                      {"vertices", loaded.meshes[i].vertex_count},
                       {"keyframes", body.plans.keyframe_count()},
                       {"moving", body.plans.moving()},
                       {"kind", word(body.primitives.kind)},
                       {"self", i < loaded.self.size() && loaded.self[i]},
                       {"degenerate", loaded.meshes[i].degenerate_primitives}});
+    if (i < loaded.vertices_of.size() && loaded.vertices_of[i] != i)
+      bodies.back()["vertices_of"] = loaded.vertices_of[i];
   }
   json record{{"name", scene.name},
               {"order", word(loaded.order)},
@@ -58,6 +60,7 @@ json scene_record(const Scene<S>& scene, const LoadedScene& loaded, std::uint32_
               {"frame_times", hexadecimal(hash_of_times(frames))},
               {"primitives", scene.primitive_count()},
               {"bodies", bodies}};
+  if (loaded.radius) record["radius"] = *loaded.radius;
   if (!script.empty()) record["script"] = script_record(script, frames.empty() ? 0 : frames.back());
   return record;
 }

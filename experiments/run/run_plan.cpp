@@ -236,7 +236,13 @@ class Runner {
            " only keyframes are compared with the truth; take a number without common factors");
     Measurement<S> measurement(scene, frames, oracle, script.empty() ? nullptr : &script, study.asks.changes);
     measure_all(study, contestants, loaded, about_scene, title, measurement,
-                [&](const Info& info) { return unsuitable(info, scene, script, frames); });
+                [&](const Info& info) -> std::string {
+                  const auto& kinds = info.primitives;
+                  if (loaded.radius &&
+                      std::find(kinds.begin(), kinds.end(), PrimitiveKind::control_nets) == kinds.end())
+                    return "takes no radius, because it takes no control nets";
+                  return unsuitable(info, scene, script, frames);
+                });
   }
 
   /// Does the same for rays and points.

@@ -116,7 +116,7 @@ BodyCard card_of(const Body<float>& body) {
 
 std::vector<BodyCard> cards(const LoadedScene& scene) {
   std::vector<BodyCard> list;
-  for (const Body<float>& body : assemble<float>(scene).bodies) list.push_back(card_of(body));
+  for (const Body<float>& body : assemble_meshes<float>(scene).bodies) list.push_back(card_of(body));
   return list;
 }
 
@@ -171,6 +171,8 @@ std::uint64_t card_hash(const LoadedScene& scene) {
     hasher.list(mesh.keyframe_times);
     hasher.list(mesh.positions);
   }
+  if (!scene.vertices_of.empty()) hasher.list(scene.vertices_of);
+  if (scene.radius) hasher.bytes(&*scene.radius, sizeof(double));
   return hasher.value();
 }
 
@@ -182,6 +184,8 @@ void export_scene(const LoadedScene& scene, const std::filesystem::path& folder,
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
+    // Elements of another body lie on its surface, which is drawn.
+    if (!scene.vertices_of.empty() && scene.vertices_of[i] != i) continue;
     const io::AnimatedMesh mesh = thinned(scene.meshes[i], most_keyframes);
     const std::string file = std::to_string(i) + "-" + file_name(mesh.name);
     io::save_obj(mesh, folder / (file + ".obj"));

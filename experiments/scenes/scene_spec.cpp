@@ -1,16 +1,17 @@
 #include "experiments/scenes/scene_spec.hpp"
 
+#include <algorithm>
 #include <functional>
 #include <set>
 
 #include "core/geometry/polygon_cut.hpp"
 #include "core/motion/admissible.hpp"
 #include "core/scene/cut_polygons.hpp"
-#include "core/topology/renumber.hpp"
 #include "experiments/common/environment.hpp"
 #include "experiments/common/json_reader.hpp"
 #include "experiments/common/names.hpp"
 #include "experiments/common/text.hpp"
+#include "experiments/io/bytes.hpp"
 #include "experiments/io/frames.hpp"
 #include "experiments/io/load.hpp"
 #include "experiments/scenes/curves.hpp"
@@ -94,6 +95,12 @@ BodySpec read_body(const json& value, const std::string& place, const fs::path& 
   body.place = place;
   body.name = keys.word("name").value_or("");
   check_name(body.name, place + ": name");
+  body.self = keys.truth("self").value_or(false);
+  if (keys.has("elements") || keys.has("of")) {
+    body.elements = read_elements(keys);
+    keys.finish();
+    return body;
+  }
   body.placement.scale = keys.number("scale").value_or(1);
   if (body.placement.scale == 0) keys.fail("scale", "must not be 0");
   for (const std::string& rotation : keys.words("rotate"))
@@ -101,10 +108,10 @@ BodySpec read_body(const json& value, const std::string& place, const fs::path& 
   if (const auto move = keys.numbers("translate", 3))
     std::copy(move->begin(), move->end(), body.placement.translate);
   body.as = take_as_of(keys);
-  body.self = keys.truth("self").value_or(false);
   body.paths = paths_of(keys);
   if (keys.has("file") == keys.has("shape"))
-    throw io::InputError(place + ": a body has either a file or a shape");
+    throw io::InputError(place +
+                         ": a body has either a file or a shape, or consists of elements of another body");
   if (keys.has("shape")) {
     if (const json* triangles = keys.find("triangles"); triangles != nullptr && triangles->is_array())
       keys.fail("triangles", "a sweep belongs to the scene, a body has one number");
@@ -164,6 +171,27 @@ void check_is_a_file(const BodySpec& body) {
                        word + "'; shapes are " + joined(shape_names()) + suggestion(word, shape_names()));
 }
 
+/// Reads the radius, which nothing must contradict: a scene with one consists of boxes on straight lines.
+std::optional<double> radius_of(JsonReader& keys, const SceneSpec& scene) {
+  const auto radius = keys.number("radius");
+  if (!radius) return {};
+  if (*radius < 0) keys.fail("radius", "must not be negative, got " + io::text_of(*radius));
+  if (scene.script)
+    keys.fail("radius", "a scene with a script has none: boxes do not follow changes of plans");
+  if (!scene.builtin.empty() && find_builtin_scene(scene.builtin).changes_plans())
+    keys.fail("radius", "the scene '" + scene.builtin + "' has none: it changes plans at run time");
+  const bool smooth = scene.paths == Paths::smooth ||
+                      std::any_of(scene.bodies.begin(), scene.bodies.end(),
+                                  [](const BodySpec& body) { return body.paths == Paths::smooth; });
+  if (smooth) keys.fail("radius", "a scene with smooth curves has none: corners of boxes move on lines");
+  return radius;
+}
+
+bool has_elements(const SceneSpec& scene) {
+  return std::any_of(scene.bodies.begin(), scene.bodies.end(),
+                     [](const BodySpec& body) { return body.elements.has_value(); });
+}
+
 VertexOrder order_of(const std::string& word, const JsonReader& keys) {
   if (word == "given") return VertexOrder::given;
   if (word == "shuffled") return VertexOrder::shuffled;
@@ -201,7 +229,8 @@ std::string given_name(const SceneSpec& spec) {
 
 json body_from_text(const std::string& text) {
   const std::string where = "body '" + text + "'";
-  static const std::set<std::string> words{"name", "motion", "clip", "as", "knots", "curves"},
+  static const std::set<std::string> words{"name",  "motion", "clip",     "as",
+                                           "knots", "curves", "elements", "of"},
       wholes{"triangles", "keyframes", "seed", "spans", "degree"},
       vectors{"translate", "centre", "step", "lower", "upper"};
   json body = json::object();
@@ -211,7 +240,9 @@ json body_from_text(const std::string& text) {
   // "name:key=value" means a shape, even if there is no shape of that name.
   const bool means_a_shape = colon != std::string::npos && head.find_first_of("./\\") == std::string::npos &&
                              head != "data" && parse_assignment(parts[0].substr(colon + 1));
-  if (is_shape(head) || means_a_shape) {
+  if (parts[0].starts_with("elements=") || parts[0].starts_with("of=")) {
+    // A body of elements has neither a file nor a shape.
+  } else if (is_shape(head) || means_a_shape) {
     shape_kind(head, where);
     body["shape"] = head;
     if (colon == std::string::npos)
@@ -275,6 +306,8 @@ std::vector<SceneSpec> read_scenes(const json& scene, const std::string& place, 
       base.bodies.push_back(read_body(bodies[i], place + ": bodies[" + std::to_string(i) + "]", folder));
     if (!base.optional)
       for (const BodySpec& body : base.bodies) check_is_a_file(body);
+    find_meshes_of_elements(base.bodies);
+    base.pairs = read_body_pairs(keys, base.bodies);
     for (const char* key : {"triangles", "keyframes", "obstacle", "curves"})
       if (keys.has(key)) keys.fail(key, "is for built-in scenes; bodies have their own numbers");
   } else {
@@ -283,6 +316,7 @@ std::vector<SceneSpec> read_scenes(const json& scene, const std::string& place, 
     } catch (const io::InputError& problem) {
       throw io::InputError(place + ": " + problem.what());
     }
+    if (keys.has("pairs")) keys.fail("pairs", "is for scenes with bodies; built-in scenes ask for their own");
   }
   if (const json* script = keys.find("script")) {
     if (!base.builtin.empty() && find_builtin_scene(base.builtin).changes_plans())
@@ -296,6 +330,7 @@ std::vector<SceneSpec> read_scenes(const json& scene, const std::string& place, 
       std::uint32_t(keys.whole("keyframes", ranges::keyframes).value_or(base.options.keyframes));
   base.options.obstacle_triangles = std::uint32_t(keys.whole("obstacle", ranges::triangles).value_or(0));
   base.paths = paths_of(keys);
+  base.radius = radius_of(keys, base);
   if (base.options.obstacle_triangles > 0 && find_builtin_scene(base.builtin).bodies == BodiesOf::one)
     keys.fail("obstacle", "the scene '" + base.builtin + "' has one body");
   keys.finish();
@@ -313,6 +348,8 @@ std::vector<SceneSpec> read_scenes(const json& scene, const std::string& place, 
         spec.order = order_of(order, keys);
         if (spec.script && spec.order != VertexOrder::given)
           keys.fail("order", "a script names vertices in the given order");
+        if (spec.order == VertexOrder::renumbered && has_elements(spec))
+          keys.fail("order", "bodies of elements share their vertices, which are not renumbered");
         spec.said = text_of(json{object, count, seed, order}) + " in " + folder.string();
         spec.object = located_object;
         if (!spec.builtin.empty()) spec.object["triangles"] = count;
@@ -379,8 +416,18 @@ LoadedScene load(const SceneSpec& spec, const MakeProgress& progress) {
   }
   std::vector<std::string> names;
   loaded.sources.assign(loaded.meshes.size(), "built-in scene " + spec.builtin);
+  const bool shares_vertices = has_elements(spec);
   for (const BodySpec& body : spec.bodies) {
+    if (shares_vertices)
+      loaded.vertices_of.push_back(body.elements ? body.elements->body : std::uint32_t(loaded.meshes.size()));
+    loaded.self.push_back(body.self);
     io::AnimatedMesh mesh;
+    if (body.elements) {  // made below, from a mesh in its final order
+      loaded.sources.push_back(body.elements->of);
+      names.push_back(body.name);
+      loaded.meshes.push_back(std::move(mesh));
+      continue;
+    }
     if (!body.shape.is_null()) {
       JsonReader keys(body.shape, body.place);
       mesh = make_shape(keys);
@@ -424,85 +471,30 @@ LoadedScene load(const SceneSpec& spec, const MakeProgress& progress) {
     place(mesh, body.placement);
     loaded.sources.push_back(source);
     names.push_back(mesh.name);
-    loaded.self.push_back(body.self);
     loaded.meshes.push_back(std::move(mesh));
   }
   if (spec.self) loaded.self.assign(loaded.meshes.size(), true);
   if (loaded.name.empty()) loaded.name = name_of_bodies(names);
+  if (spec.radius) loaded.name += "-radius" + io::text_of(*spec.radius);
   if (!spec.name.empty()) loaded.name = spec.name;
   loaded.order = spec.order;
   loaded.script = spec.script;
+  loaded.pairs = spec.pairs;
+  loaded.radius = spec.radius;
   loaded.name += suffix(spec.order);
   if (spec.order == VertexOrder::shuffled)
     for (std::size_t i = 0; i < loaded.meshes.size(); ++i)
-      shuffle_vertices(loaded.meshes[i], hash_of(std::to_string(i), spec.options.seed));
+      if (loaded.vertices_of.empty() || loaded.vertices_of[i] == i)
+        shuffle_vertices(loaded.meshes[i], hash_of(std::to_string(i), spec.options.seed));
+  for (std::size_t i = 0; i < spec.bodies.size(); ++i) {
+    const BodySpec& body = spec.bodies[i];
+    if (!body.elements) continue;
+    loaded.meshes[i] =
+        mesh_of_elements(loaded.meshes[body.elements->body], body.elements->elements, body.place);
+    loaded.meshes[i].name = body.name;
+  }
   if (loaded.meshes.empty()) throw io::InputError("the scene has no body");
   return loaded;
 }
-
-namespace {
-PrimitiveKind kind_of(io::MeshKind kind) {
-  switch (kind) {
-    case io::MeshKind::points:
-      return PrimitiveKind::points;
-    case io::MeshKind::control_nets:
-      return PrimitiveKind::control_nets;
-    case io::MeshKind::polygons:
-      break;
-  }
-  return PrimitiveKind::polygons;
-}
-}  // namespace
-
-namespace {
-void check_corners(const io::AnimatedMesh& mesh, const std::string& source) {
-  for (std::size_t p = 0; p < mesh.primitive_count(); ++p) {
-    const std::uint32_t corners = mesh.primitive_offsets[p + 1] - mesh.primitive_offsets[p];
-    if (corners <= most_corners) continue;
-    throw io::InputError(source + ": polygon " + std::to_string(p) + " has " + std::to_string(corners) +
-                         " corners; at most " + std::to_string(most_corners) +
-                         " are possible, as=triangles cuts it into triangles");
-  }
-}
-}  // namespace
-
-template <class S>
-Scene<S> assemble(const LoadedScene& loaded) {
-  Scene<S> scene;
-  scene.name = loaded.name;
-  for (std::size_t i = 0; i < loaded.meshes.size(); ++i) {
-    const io::AnimatedMesh& mesh = loaded.meshes[i];
-    check_corners(mesh, loaded.sources[i]);
-    Body<S> body;
-    body.name = mesh.name;
-    body.primitives.kind = kind_of(mesh.kind);
-    body.primitives.offsets = mesh.primitive_offsets;
-    body.primitives.vertices = mesh.primitive_vertices;
-    std::vector<SegmentBends<S>> bends;
-    for (const io::AnimatedMesh::Bends& segment : mesh.bends)
-      bends.push_back(
-          {{segment.bend.begin(), segment.bend.end()}, {segment.twist.begin(), segment.twist.end()}});
-    try {
-      body.plans =
-          FlightPlans<S>(mesh.vertex_count, mesh.keyframe_times,
-                         std::vector<S>(mesh.positions.begin(), mesh.positions.end()), std::move(bends));
-    } catch (const std::invalid_argument& problem) {
-      throw io::InputError(loaded.sources[i] + ": body '" + mesh.name + "' as " +
-                           (sizeof(S) == 4 ? "float" : "double") + ": " + problem.what());
-    }
-    scene.bodies.push_back(std::move(body));
-  }
-  scene.pairs = all_pairs(scene.bodies);
-  for (std::uint32_t i = 0; i < loaded.self.size(); ++i)
-    if (loaded.self[i]) scene.pairs.push_back({i, i});
-  validate(scene);
-  cut_polygons(scene);
-  if (loaded.order == VertexOrder::renumbered)
-    scene = std::move(renumber_in_leaf_order(scene, BuilderConfig{}).scene);
-  return scene;
-}
-
-template Scene<float> assemble(const LoadedScene&);
-template Scene<double> assemble(const LoadedScene&);
 
 }  // namespace kbvh::experiments

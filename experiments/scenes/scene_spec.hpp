@@ -9,6 +9,7 @@
 #include "experiments/io/animated_mesh.hpp"
 #include "experiments/io/primitives.hpp"
 #include "experiments/scenes/builtin_scenes.hpp"
+#include "experiments/scenes/element_bodies.hpp"
 #include "experiments/scenes/placement.hpp"
 #include "experiments/scenes/scripted.hpp"
 
@@ -21,13 +22,14 @@ enum class Paths : std::uint8_t {
   smooth,  ///< on cubics through the keyframes (curves.hpp)
 };
 
-/// One body of a scene from files, or by formula.
+/// One body of a scene from files, by formula, or of elements of another body.
 struct BodySpec {
   std::string name;                    ///< empty: from the file or the shape
-  std::filesystem::path file, motion;  ///< file is empty for shapes
+  std::filesystem::path file, motion;  ///< file is empty for shapes and elements
   std::string clip;
   double frames_per_second = 0;
-  nlohmann::json shape;  ///< for make_shape; null for files
+  nlohmann::json shape;                  ///< for make_shape; null for files and elements
+  std::optional<ElementsSpec> elements;  ///< it then has the vertices and the motion of another body
   io::TakeAs as = io::TakeAs::given;
   Placement placement;
   bool self = false;  ///< pairs within it are requested, too
@@ -50,6 +52,8 @@ struct SceneSpec {
   BuiltinOptions options;
   Paths paths = Paths::given;  ///< of a built-in scene
   std::vector<BodySpec> bodies;
+  std::optional<std::vector<BodyPair>> pairs;  ///< of the bodies; nothing: all with a moving body
+  std::optional<double> radius;      ///< pairs are those of boxes grown by half of it; nothing: exact pairs
   std::optional<ScriptSpec> script;  ///< user-defined plan changes
   VertexOrder order = VertexOrder::given;
   bool self = false;      ///< pairs within every body are requested, too
@@ -94,6 +98,11 @@ struct LoadedScene {
   std::vector<io::AnimatedMesh> meshes;  ///< placed, in double
   std::vector<std::string> sources;      ///< of each: its file, or its generator
   std::vector<bool> self;                ///< whether pairs within each body are requested; empty: of none
+  /// For each body the one whose vertices it has: itself, or an earlier body, of which its mesh is a copy
+  /// with other primitives; empty: all have their own.
+  std::vector<std::uint32_t> vertices_of;
+  std::optional<std::vector<BodyPair>> pairs;  ///< without those of `self`; nothing: all with a moving body
+  std::optional<double> radius;                ///< as in SceneSpec
   SceneOrigin origin = SceneOrigin::shapes;
   VertexOrder order = VertexOrder::given;  ///< `renumbered` is done by `assemble`
   std::optional<ReversalRule> reversal;    ///< of scenes that record their plan changes
@@ -108,10 +117,15 @@ LoadedScene load(const SceneSpec& spec, const MakeProgress& progress = {});
 /// Returns the name of a missing file of an optional scene, else "".
 std::string missing_file(const SceneSpec& spec);
 
-/// Makes the scene in one scalar: every coordinate is rounded once. Body pairs: all pairs with at least one
-/// moving body, then the requested pairs of bodies with themselves. Throws io::InputError that names the
-/// body, e.g. if a coordinate does not fit the scalar.
+/// Makes the scene in one scalar: every coordinate is rounded once. Body pairs: the listed ones, or all pairs
+/// with at least one moving body; then the requested pairs of bodies with themselves. A scene with a radius
+/// consists of grown boxes: each vertex is two, the corners of its box (core/scene/with_radius.hpp). Throws
+/// io::InputError that names the body, e.g. if a coordinate does not fit the scalar.
 template <class S>
 Scene<S> assemble(const LoadedScene& loaded);
+
+/// Makes the scene as if it had no radius: its meshes themselves.
+template <class S>
+Scene<S> assemble_meshes(const LoadedScene& loaded);
 
 }  // namespace kbvh::experiments

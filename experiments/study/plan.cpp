@@ -143,10 +143,15 @@ Plan read_plan(const json& value, const std::string& place, const std::filesyste
     plan.studies.push_back(std::move(study));
   }
   if (studies.empty()) plan.studies.push_back(common);
-  for (const Study& study : plan.studies)
-    if (study.scenes.empty())
-      throw io::InputError(place + ": scenes: is missing" +
-                           (studies.empty() ? "" : " in the study '" + study.name + "'"));
+  for (const Study& study : plan.studies) {
+    const std::string in_study = studies.empty() ? "" : " in the study '" + study.name + "'";
+    if (study.scenes.empty()) throw io::InputError(place + ": scenes: is missing" + in_study);
+    const bool boxes = std::any_of(study.scenes.begin(), study.scenes.end(),
+                                   [](const SceneSpec& spec) { return spec.radius.has_value(); });
+    if (boxes && !study.asks.of_pairs())
+      throw io::InputError(place + ": scenes: one has a radius" + in_study +
+                           ", so it has pairs of boxes, but no contacts and no answers to rays and points");
+  }
   check_target_scenes(plan);
   return plan;
 }

@@ -117,6 +117,69 @@ TYPED_TEST(StrategiesAsBroadPhases, FindWhatBroadPhaseFinds) {
   }
 }
 
+TYPED_TEST(StrategiesAsBroadPhases, FilterAsBroadPhaseDoes) {
+  using S = TypeParam;
+  const Mesh<S> mesh = broad_phase::crumpled<S>(9, 5);
+  const Elements elements = mesh.elements();
+  const S radius = S(0.2);
+  BroadPhase<S> own;
+  mesh.build(own, radius);
+  StrategyBroadPhase<S> broad("bottom_up");
+  build(broad, mesh, radius);
+  CandidateBuffer expected, found;
+  const auto of_all_kinds = [&] {
+    std::vector<std::size_t> counts;
+    for (const CandidateKind kind : candidate_kinds) {
+      own.detect(kind, expected);
+      broad.detect(kind, found);
+      std::sort(expected.begin(), expected.end());
+      std::sort(found.begin(), found.end());
+      EXPECT_EQ(found, expected) << name(kind);
+      counts.push_back(found.size());
+    }
+    return counts;
+  };
+  const std::vector<std::size_t> unfiltered = of_all_kinds();
+  const auto on_both = [&](const auto& filter) {
+    filter(own);
+    filter(broad);
+    EXPECT_NE(of_all_kinds(), unfiltered);
+  };
+  std::vector<GroupMask> of_vertices, of_faces;
+  for (std::uint32_t v = 0; v < elements.vertex_count(); ++v) of_vertices.push_back({1u << (v % 3), 1u << 1});
+  for (std::uint32_t f = 0; f < elements.count(Element::face); ++f) of_faces.push_back({f % 4, 3});
+  on_both([&](auto& phase) { phase.set_vertex_groups(of_vertices); });
+  on_both([&](auto& phase) { phase.set_groups(Element::face, of_faces); });
+  on_both([&](auto& phase) { phase.clear_filters(), phase.exclude_rings(2); });
+  own.detect(CandidateKind::edge_edge, expected);
+  ASSERT_GT(expected.size(), 1u);
+  const std::vector<Candidate> some{expected[0], {expected[1].second, expected[1].first}};
+  on_both([&](auto& phase) { phase.exclude(CandidateKind::edge_edge, some); });
+  on_both([&](auto& phase) {
+    phase.clear_filters();
+    phase.keep_only([](CandidateKind kind, std::span<Candidate> pairs) {
+      std::size_t kept = 0;
+      for (const Candidate& pair : pairs)
+        if (kind == CandidateKind::edge_face || pair.first % 2 == 0) pairs[kept++] = pair;
+      return kept;
+    });
+  });
+  own.clear_filters();
+  broad.clear_filters();
+  EXPECT_EQ(of_all_kinds(), unfiltered);
+  // Seeded fault: one side has forgotten a filter. A new mesh has none.
+  broad.exclude_rings(3);
+  own.detect(CandidateKind::face_face, expected);
+  broad.detect(CandidateKind::face_face, found);
+  EXPECT_LT(found.size(), expected.size());
+  build(broad, mesh, radius);
+  EXPECT_EQ(of_all_kinds(), unfiltered);
+  EXPECT_THROW(broad.set_groups(Element::face, of_vertices), std::invalid_argument);
+  EXPECT_THROW(broad.exclude(CandidateKind::edge_edge, std::vector<Candidate>{{0, 1u << 20}}),
+               std::invalid_argument);
+  EXPECT_THROW(StrategyBroadPhase<S>("bottom_up").exclude_rings(1), std::logic_error);
+}
+
 /// Seeded fault: a mesh whose radius is forgotten, or whose motion is.
 TYPED_TEST(StrategiesAsBroadPhases, AreComparedWithTheRightBoxes) {
   using S = TypeParam;

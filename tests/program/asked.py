@@ -23,11 +23,23 @@ SCENES = [
     {"name": "two shapes", "bodies": [{"shape": "sphere", "triangles": 80, "keyframes": 3, "step": [0.1, 0, 0]},
                                       {"shape": "sphere", "triangles": 60, "centre": [0.5, 0.1, 0]}]},  # only a plan can
 ]  # fmt: skip
+#: Scenes of bodies over the vertices of others: only a plan can name them.
+ELEMENTS = [
+    {"name": "candidates of a sheet", "radius": 0.05, "pairs": [["corners", "cloth"], ["cloth-edges", "cloth-edges"]],
+     "bodies": [{"shape": "waving_sheet", "triangles": 98, "keyframes": 3, "name": "cloth"},
+                {"elements": "vertices", "of": "cloth", "name": "corners"}, "elements=edges,of=cloth"]},
+    {"name": "edges of a ball", "bodies": [{"shape": "sphere", "triangles": 80, "keyframes": 3, "step": [0.1, 0, 0], "name": "ball"},
+                                           {"shape": "sphere", "triangles": 60, "centre": [0.5, 0.1, 0]},
+                                           {"elements": "edges", "of": "ball"}]},
+]  # fmt: skip
 PLAIN = {"scenes": SCENES, "strategies": ["bottom_up"], "l": 2, "repetitions": 2}
 #: Plans by what they ask.
 ASKED: dict[str, dict[str, Any]] = {
     "pairs": {},
     "pairs within bodies": {"scenes": [{**scene, "self": True} for scene in SCENES]},
+    "pairs of elements": {"scenes": ELEMENTS},
+    "pairs within a radius": {"scenes": [{**scene, "radius": 0.05} for scene in SCENES]},
+    "pairs within a larger radius": {"scenes": [{**scene, "radius": 0.1} for scene in SCENES]},
     "contacts": {"continuous": True},
     "changes of candidates": {"changes": "candidates"},
     "changes of pairs": {"changes": "pairs"},

@@ -64,8 +64,9 @@ json other(const std::string& key, const json& value) {
   static const std::set<std::string> free{"name",  "description", "optional", "id",
                                           "shape", "builtin",     "file",     "motion"};
   static const std::map<std::string, json> words{
-      {"median", "sah"},   {"portable", "auto"},       {"z:30", "z:31"},       {"float", "double"},
-      {"given", "points"}, {"shuffled", "renumbered"}, {"pairs", "candidates"}};
+      {"median", "sah"},   {"portable", "auto"},       {"z:30", "z:31"},        {"float", "double"},
+      {"given", "points"}, {"shuffled", "renumbered"}, {"pairs", "candidates"}, {"edges", "faces"},
+      {"cloth", "ball"},   {"ball", "cloth"},          {"sides", "ball"}};
   if (free.contains(key)) return nullptr;
   if (value.is_boolean()) return !value.get<bool>();
   if (value.is_string()) return words.at(value.get<std::string>());
@@ -122,6 +123,16 @@ TEST(Keys, SeeEveryFieldOfAScriptedScene) {
                              {"scalars", {"float"}},
                              {"repetitions", 2},
                              {"oracle_every", 1}});
+}
+
+TEST(Keys, SeeEveryFieldOfBodiesOfElements) {
+  expect_every_field_counts({{"scenes", json::parse(R"([{"name": "a", "radius": 0.25, "self": false,
+      "pairs": [["cloth", "ball"], ["sides", "sides"]],
+      "bodies": [{"shape": "waving_sheet", "triangles": 50, "keyframes": 4, "self": false, "name": "cloth"},
+                 {"shape": "sphere", "triangles": 80, "name": "ball"},
+                 {"elements": "edges", "of": "cloth", "name": "sides"}]}])")},
+                             {"strategies", strategies},
+                             {"scalars", {"float"}}});
 }
 
 /// Plans that together have every key of a study that can be altered to another of its kind.

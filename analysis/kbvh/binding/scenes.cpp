@@ -18,9 +18,12 @@ const char* word(io::MeshKind kind) {
                                         : "control_nets";
 }
 
-/// Hands a mesh's arrays to numpy, without a copy.
-py::dict body_of(io::AnimatedMesh& mesh, bool self) {
+/// Hands the arrays of a mesh to numpy, without a copy. A body over the vertices of another one has the
+/// number of that body in place of positions.
+py::dict body_of(LoadedScene& loaded, std::uint32_t body) {
   py::dict out;
+  io::AnimatedMesh& mesh = loaded.meshes[body];
+  const bool self = body < loaded.self.size() && loaded.self[body];
   const auto keyframes = py::ssize_t(mesh.keyframe_times.size()), vertices = py::ssize_t(mesh.vertex_count);
   out["name"] = mesh.name;
   out["shape"] = word(mesh.kind);
@@ -28,9 +31,13 @@ py::dict body_of(io::AnimatedMesh& mesh, bool self) {
              offsets = py::ssize_t(mesh.primitive_offsets.size());
   out["indices"] = numbers_of(std::move(mesh.primitive_vertices), {indices});
   out["offsets"] = numbers_of(std::move(mesh.primitive_offsets), {offsets});
+  out["self_pairs"] = self;
+  if (body < loaded.vertices_of.size() && loaded.vertices_of[body] != body) {
+    out["over"] = loaded.vertices_of[body];
+    return out;
+  }
   out["times"] = numbers_of(std::move(mesh.keyframe_times), {keyframes});
   out["positions"] = numbers_of(std::move(mesh.positions), {keyframes, vertices, 3});
-  out["self_pairs"] = self;
   return out;
 }
 
@@ -105,9 +112,15 @@ py::dict make_scene(const std::string& description, const std::string& folder, c
   }
   out["changes"] = loaded.reversal.has_value() || loaded.drag.has_value() || loaded.script.has_value();
   py::list bodies;
-  for (std::size_t i = 0; i < loaded.meshes.size(); ++i)
-    bodies.append(body_of(loaded.meshes[i], i < loaded.self.size() && loaded.self[i]));
+  for (std::uint32_t i = 0; i < loaded.meshes.size(); ++i) bodies.append(body_of(loaded, i));
   out["bodies"] = bodies;
+  out["radius"] = loaded.radius ? py::object(py::float_(*loaded.radius)) : py::object(py::none());
+  out["pairs"] = py::none();
+  if (loaded.pairs) {
+    py::list pairs;
+    for (const BodyPair& pair : *loaded.pairs) pairs.append(py::make_tuple(pair.first, pair.second));
+    out["pairs"] = pairs;
+  }
   return out;
 }
 

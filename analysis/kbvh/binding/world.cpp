@@ -56,6 +56,27 @@ py::dict plain(const WorldVerdict& verdict) {
   return out;
 }
 
+/// The primitives of a body of a caller, whose arrays are kept for the call that adds the body.
+class GivenPrimitives {
+ public:
+  GivenPrimitives(const std::string& what, const py::object& indices, const py::object& offsets,
+                  const std::string& shape)
+      : vertices_(indices, what + ", its indices"), shape_(shape_of(shape)) {
+    if (offsets.is_none()) return;
+    offsets_.emplace(offsets, what + ", its offsets");
+    if (offsets_->span().empty())
+      throw std::invalid_argument(what + ": offsets begin with 0, but there are none");
+  }
+  Connectivity connectivity() const {
+    return {vertices_.span(), offsets_ ? offsets_->span() : std::span<const std::uint32_t>(), shape_};
+  }
+
+ private:
+  Ids vertices_;
+  std::optional<Ids> offsets_;
+  Shape shape_;
+};
+
 /// The façade for Python: keeps alive the arrays whose memory the world reads, and lets other threads run
 /// while it works.
 class PythonWorld {
@@ -66,17 +87,10 @@ class PythonWorld {
   std::uint32_t add_body(const std::string& name, const py::object& indices, const py::object& offsets,
                          const std::string& shape, const py::object& times, const py::object& positions) {
     const std::string what = "body '" + name + "'";
-    const Ids vertices(indices, what + ", its indices");
-    std::unique_ptr<Ids> starts;
-    if (!offsets.is_none()) {
-      starts = std::make_unique<Ids>(offsets, what + ", its offsets");
-      if (starts->span().empty())
-        throw std::invalid_argument(what + ": offsets begin with 0, but there are none");
-    }
+    const GivenPrimitives primitives(what, indices, offsets, shape);
     const Numbers numbers(positions, what + ", its positions");
     numbers.check_points(what + ", its positions");
-    const Connectivity connectivity{
-        vertices.span(), starts ? starts->span() : std::span<const std::uint32_t>(), shape_of(shape)};
+    const Connectivity connectivity = primitives.connectivity();
     const auto add = [&](auto span) {
       if (times.is_none()) return world_.add_body(name, connectivity, span);
       const std::vector<double> keyframes = doubles_of(times, what + ", its times");
@@ -86,7 +100,18 @@ class PythonWorld {
     given_.emplace_back();
     return body;
   }
+  std::uint32_t add_body_over(Whole over, const std::string& name, const py::object& indices,
+                              const py::object& offsets, const std::string& shape) {
+    const GivenPrimitives primitives("body '" + name + "'", indices, offsets, shape);
+    const std::uint32_t body = world_.add_body_over(over, name, primitives.connectivity());
+    given_.emplace_back();
+    return body;
+  }
   void add_pair(Whole a, Whole b) { world_.add_pair(a, b); }
+  void set_radius(Real radius) {
+    world_.set_radius(radius);
+    has_radius_ = true;
+  }
 
   void start(const std::string& strategy, const Words& params, Real t, const Words& topology) {
     alone([&] { world_.start(strategy, params, t, topology); });
@@ -326,7 +351,7 @@ class PythonWorld {
       hand_in(numbers.floats());
     else
       hand_in(numbers.doubles());
-    return numbers.size() % 3 == 1 && numbers.single() == (precision_ == "float32");
+    return !has_radius_ && numbers.size() % 3 == 1 && numbers.single() == (precision_ == "float32");
   }
 
   template <class Work>
@@ -355,6 +380,7 @@ class PythonWorld {
   std::string precision_;
   World world_;
   std::vector<Given> given_;
+  bool has_radius_ = false;
   bool busy_ = false;  ///< guarded by the interpreter's lock
 };
 
@@ -413,6 +439,9 @@ void bind_world(py::module_& module) {
       .def_property_readonly("time", method(&PythonWorld::time))
       .def("add_body", method(&PythonWorld::add_body), arg("name"), arg("indices"), arg("offsets"),
            arg("shape"), arg("times"), arg("positions"))
+      .def("add_body_over", method(&PythonWorld::add_body_over), arg("body"), arg("name"), arg("indices"),
+           arg("offsets"), arg("shape"))
+      .def("set_radius", method(&PythonWorld::set_radius), arg("radius"))
       .def("add_pair", method(&PythonWorld::add_pair), arg("body_a"), arg("body_b"))
       .def("start", method(&PythonWorld::start), arg("strategy"), arg("params"), arg("t"), arg("topology"))
       .def("reset", method(&PythonWorld::reset), arg("t"))
