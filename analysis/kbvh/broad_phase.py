@@ -199,8 +199,8 @@ class BroadPhase:
 
     def keep_only(self, choose: Optional[Callable[[str, npt.NDArray[np.uint32]], Any]]) -> None:
         """Lets a function choose among the pairs that no other filter excludes: choose(kind, pairs) gets many pairs (n, 2) at a
-        time and returns an array of n truth values. It has to give the same answer whenever it is asked about a pair. None
-        ends this."""
+        time and returns an array of n truth values. It has to give the same answer whenever it is asked about a pair, and must
+        not use this object: that raises RuntimeError. None ends this."""
         self._core.keep_only(choose)
 
     def clear_filters(self) -> None:

@@ -32,12 +32,6 @@ struct kbvh_broad_phase {
 
 namespace {
 
-template <class S>
-MatrixView<S> view(const kbvh_positions& positions) {
-  return {static_cast<const S*>(positions.data), positions.rows, 3, positions.row_step,
-          positions.column_step};
-}
-
 /// Calls work(broad phase, S()) and turns exceptions into an error text.
 template <class Work>
 int guarded(kbvh_broad_phase* handle, const Work& work) {
@@ -71,11 +65,31 @@ void check_pointer(const void* pointer, const char* what) {
   if (pointer == nullptr) throw std::invalid_argument(std::string(what) + " is a null pointer");
 }
 
+/// Returns a list of a caller, which may be a null pointer only if it is empty.
+template <class T>
+std::span<const T> list_of(const T* list, std::size_t count, const char* what) {
+  if (count != 0) check_pointer(list, what);
+  return {list, count};
+}
+
+template <class S>
+MatrixView<S> view(const kbvh_positions& positions) {
+  if (positions.rows != 0) check_pointer(positions.data, "the data of positions");
+  return {static_cast<const S*>(positions.data), positions.rows, 3, positions.row_step,
+          positions.column_step};
+}
+
+/// Returns the rows of edges or faces, of `columns` vertices each.
+MatrixView<std::int32_t> rows_of(const std::int32_t* ids, std::size_t count, std::size_t columns,
+                                 const char* what) {
+  if (count != 0) check_pointer(ids, what);
+  return MatrixView<std::int32_t>::by_rows(ids, count, columns);
+}
+
 /// Groups of a caller, in the layout of this library.
 std::vector<GroupMask> groups_of(const kbvh_group_mask* groups, std::size_t count) {
-  if (count != 0) check_pointer(groups, "groups");
   std::vector<GroupMask> list;
-  for (std::size_t i = 0; i < count; ++i) list.push_back({groups[i].groups, groups[i].mask});
+  for (const kbvh_group_mask& one : list_of(groups, count, "groups")) list.push_back({one.groups, one.mask});
   return list;
 }
 
@@ -108,8 +122,7 @@ int kbvh_broad_phase_build(kbvh_broad_phase* handle, const kbvh_positions* v0, c
                            double radius) {
   return guarded(handle, [&]<class S>(BroadPhase<S>& broad, S) {
     check_pointer(v0, "v0");
-    const auto e = MatrixView<std::int32_t>::by_rows(edges, edge_count, 2);
-    const auto f = MatrixView<std::int32_t>::by_rows(faces, face_count, 3);
+    const auto e = rows_of(edges, edge_count, 2, "edges"), f = rows_of(faces, face_count, 3, "faces");
     if (v1 == nullptr)
       broad.build(view<S>(*v0), e, f, radius);
     else
@@ -131,7 +144,7 @@ int kbvh_broad_phase_update_moved(kbvh_broad_phase* handle, const kbvh_positions
                                   size_t count) {
   return guarded(handle, [&]<class S>(BroadPhase<S>& broad, S) {
     check_pointer(v, "v");
-    broad.update(view<S>(*v), std::span<const std::uint32_t>(moved, count));
+    broad.update(view<S>(*v), list_of(moved, count, "moved"));
   });
 }
 
@@ -171,9 +184,9 @@ int kbvh_broad_phase_insert(kbvh_broad_phase* handle, const kbvh_positions* v, c
                             size_t edge_count, const int32_t* faces, size_t face_count, uint32_t first[3]) {
   return guarded(handle, [&]<class S>(BroadPhase<S>& broad, S) {
     check_pointer(first, "first");
-    const InsertedElements inserted = broad.insert(v == nullptr ? MatrixView<S>() : view<S>(*v),
-                                                   MatrixView<std::int32_t>::by_rows(edges, edge_count, 2),
-                                                   MatrixView<std::int32_t>::by_rows(faces, face_count, 3));
+    const InsertedElements inserted =
+        broad.insert(v == nullptr ? MatrixView<S>() : view<S>(*v), rows_of(edges, edge_count, 2, "edges"),
+                     rows_of(faces, face_count, 3, "faces"));
     first[0] = inserted.vertex;
     first[1] = inserted.edge;
     first[2] = inserted.face;
@@ -182,9 +195,8 @@ int kbvh_broad_phase_insert(kbvh_broad_phase* handle, const kbvh_positions* v, c
 
 int kbvh_broad_phase_remove(kbvh_broad_phase* handle, kbvh_element element, const uint32_t* ids,
                             size_t count) {
-  return guarded(handle, [&](auto& broad, auto) {
-    broad.remove(checked(element), std::span<const std::uint32_t>(ids, count));
-  });
+  return guarded(handle,
+                 [&](auto& broad, auto) { broad.remove(checked(element), list_of(ids, count, "ids")); });
 }
 
 int kbvh_broad_phase_set_groups(kbvh_broad_phase* handle, kbvh_element element, const kbvh_group_mask* groups,

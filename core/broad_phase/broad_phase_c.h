@@ -2,7 +2,8 @@
    (broad_phase.hpp says what each call means) behind one handle and plain arrays.
 
    Calls that return int return 0, or -1 after an error, which changes nothing and which
-   kbvh_broad_phase_error describes. A handle is used by one thread at a time. */
+   kbvh_broad_phase_error describes. A null pointer is an error, but for an empty list and where a comment
+   says otherwise. A handle is used by one thread at a time, and not by a filter that it asks. */
 #ifndef KBVH_BROAD_PHASE_C_H
 #define KBVH_BROAD_PHASE_C_H
 

@@ -45,18 +45,33 @@ BuilderConfig suitable_builder(const Info& info, std::optional<BuildMethod> meth
 
 namespace {
 
-/// Returns where a keyframe exceeds the range of the contestant; empty if none does.
+/// Returns where a body exceeds the range of the contestant: at a keyframe, or on a curve between two, of
+/// which `bulge` bounds the distance from the chord. Empty if it does not.
 template <class S>
 std::string beyond_range(const Info& info, const Body<S>& body) {
   const FlightPlans<S>& plans = body.plans;
+  const auto refusal = [&](std::size_t i, const char* verb, double x, const std::string& when) {
+    return "takes coordinates up to " + number_text(info.max_coordinate) + ", but vertex " +
+           std::to_string(i / 3) + " of body '" + body.name + "' " + verb + " " + "xyz"[i % 3] + " = " +
+           number_text(x) + when;
+  };
   for (std::size_t k = 0; k < plans.keyframe_count(); ++k) {
     const S* const positions = plans.keyframe(k);
     for (std::size_t i = 0; i < std::size_t(3) * plans.keyframed_count(); ++i)
       if (std::abs(double(positions[i])) > info.max_coordinate)
-        return "takes coordinates up to " + number_text(info.max_coordinate) + ", but vertex " +
-               std::to_string(i / 3) + " of body '" + body.name + "' is at " + "xyz"[i % 3] + " = " +
-               number_text(double(positions[i])) +
-               (plans.keyframe_count() > 1 ? " at keyframe " + std::to_string(k) : "");
+        return refusal(i, "is at", double(positions[i]),
+                       plans.keyframe_count() > 1 ? " at keyframe " + std::to_string(k) : "");
+    if (!plans.curved_in(k)) continue;
+    const S *const next = plans.keyframe(k + 1), *const bend = plans.bends(k), *const twist = plans.twists(k);
+    for (std::size_t i = 0; i < std::size_t(3) * plans.keyframed_count(); ++i) {
+      const Bulge<S> off = bulge(bend[i], twist == nullptr ? S(0) : twist[i]);
+      const double lowest = std::min(double(positions[i]), double(next[i])) + off.lower,
+                   highest = std::max(double(positions[i]), double(next[i])) + off.upper;
+      if ((off.lower < 0 && lowest < -info.max_coordinate) ||
+          (off.upper > 0 && highest > info.max_coordinate))
+        return refusal(i, "may come to", highest > info.max_coordinate ? highest : lowest,
+                       " after keyframe " + std::to_string(k));
+    }
   }
   return {};
 }

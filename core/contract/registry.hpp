@@ -104,7 +104,7 @@ BuilderConfig suitable_builder(const Info& info, std::optional<BuildMethod> meth
 
 /// Returns the reason why the strategy cannot play a scene of these bodies, as the end of a sentence that
 /// begins with its id; empty if it can. Checks pairs within a body, kinds of primitives, curves, positions
-/// handed in frame by frame, and the range of keyframes.
+/// handed in frame by frame, and the range of keyframes and, by a bound, of the curves between them.
 template <class S>
 std::string unsuitable_bodies(const Info& info, const Scene<S>& scene);
 

@@ -174,11 +174,13 @@ S moved_up(S value, double move) {
   return -moved_down(-value, -move) + S(0);
 }
 
-/// The bulge over a part of a segment, given by the shares of its ends: a curve lies below its chord by at
-/// most the largest second derivative times the square of the length over 8, and that derivative is linear.
+/// The bulge over a part of a segment, given by the shares of its ends and its length, a share too: a curve
+/// lies below its chord by at most the largest second derivative times the square of the length over 8, and
+/// that derivative is linear. The length is not to - from: in a short part, the rounding of the two shares
+/// would leave few correct digits of it.
 template <class S>
-Bulge<S> bulge_of_part(S bend, S twist, double from, double to) {
-  const double b = double(bend), w = double(twist), length = to - from;
+Bulge<S> bulge_of_part(S bend, S twist, double from, double to, double length) {
+  const double b = double(bend), w = double(twist);
   const double first = 2 * (w - b) - 6 * w * from, last = 2 * (w - b) - 6 * w * to;
   const double scale = 0.125 * length * length * (1 + 1e-12), rounding = (std::abs(b) + std::abs(w)) * 1e-14;
   return {-(std::max({0.0, first, last}) + rounding) * scale,
@@ -196,11 +198,11 @@ void FlightPlans<S>::evaluate_hull(double begin, double end, double t, S* out) c
   const S *const bend = bends(k), *const twist = twists(k);
   const bool whole = begin == times[k] && end == times[k + 1];
   const double duration = times[k + 1] - times[k], from = (begin - times[k]) / duration,
-               to = (end - times[k]) / duration;
+               to = (end - times[k]) / duration, length = (end - begin) / duration;
   for (std::size_t i = 0; i < scalars; ++i) {
     const S w = twist == nullptr ? S(0) : twist[i];
     if (bend[i] == S(0) && w == S(0)) continue;
-    const Bulge<S> distance = whole ? bulge(bend[i], w) : bulge_of_part(bend[i], w, from, to);
+    const Bulge<S> distance = whole ? bulge(bend[i], w) : bulge_of_part(bend[i], w, from, to, length);
     if (distance.lower != 0) out[i] = moved_down(out[i], distance.lower);
     if (distance.upper != 0) out[scalars + i] = moved_up(out[scalars + i], distance.upper);
   }

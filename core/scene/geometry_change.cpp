@@ -75,6 +75,8 @@ void ChangingScene<S>::check(const GeometryChange<S>& change, const Playback<S>&
     known_body(vertex.body);
     if (scene_.bodies[vertex.body].plans.curved())
       refuse("a vertex is added to body " + std::to_string(vertex.body) + ", whose vertices move on curves");
+    if (scene_.bodies[vertex.body].plans.is_handed_in())
+      refuse("a vertex is added to body " + std::to_string(vertex.body) + ", whose positions are handed in");
     FlightPlans<S>::check_new_vertex(playback.time(), vertex.plan, vertex.position,
                                      vertex_counts[vertex.body]++);
   }

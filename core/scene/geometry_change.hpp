@@ -56,7 +56,9 @@ class ChangingScene {
   /// Applies the change to the scene and to the playback, at the playback's time; polygons are cut at their
   /// positions at that time. Throws std::invalid_argument that names the first error, and changes nothing:
   /// bodies, vertices or primitives that do not exist or were removed, primitives without vertices, removed
-  /// vertices that a primitive uses, items removed twice, numbers that are not finite or not admissible.
+  /// vertices that a primitive uses, items removed twice, numbers that are not finite or not admissible,
+  /// vertices added to a body whose vertices move on curves or whose positions are handed in: the caller's
+  /// array has no place for them.
   /// Amortised O(change), but O(body) at the first removal of vertices of a body.
   void apply(const GeometryChange<S>& change, Playback<S>& playback);
 

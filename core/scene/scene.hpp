@@ -172,9 +172,10 @@ template <class S>
 std::uint32_t add_body_over(Scene<S>& scene, std::uint32_t body, std::string name, Primitives primitives) {
   std::uint32_t& set = scene.bodies[body].vertex_set;
   if (set == own_vertices) {
-    std::uint32_t unused = 0;
-    for (const Body<S>& other : scene.bodies)
-      if (other.vertex_set != own_vertices) unused = std::max(unused, other.vertex_set + 1);
+    std::uint32_t unused = 0;  // bodies may name sets by any number, the largest one included
+    while (std::any_of(scene.bodies.begin(), scene.bodies.end(),
+                       [unused](const Body<S>& other) { return other.vertex_set == unused; }))
+      ++unused;
     set = unused;
   }
   scene.bodies.push_back(

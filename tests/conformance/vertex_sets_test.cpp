@@ -223,6 +223,13 @@ TEST(VertexSetsOfScenes, AreChecked) {
   EXPECT_TRUE(two.same_vertices(1, 3));
   EXPECT_FALSE(two.same_vertices(0, 1));
   EXPECT_EQ(two.first_of_set(3), 1u);
+  // Even if the first set has the largest number.
+  Scene<float> largest = panels<float>().scene;
+  for (Body<float>& body : largest.bodies)
+    if (body.vertex_set != own_vertices) body.vertex_set = own_vertices - 1;
+  EXPECT_EQ(add_body_over(largest, 1, "again", largest.bodies[1].primitives), 3u);
+  EXPECT_TRUE(largest.same_vertices(1, 3));
+  EXPECT_FALSE(largest.same_vertices(0, 1));
 }
 
 TEST(VertexSetsOfScenes, RefuseVerticesThatAnotherBodyUses) {

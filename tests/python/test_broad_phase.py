@@ -151,6 +151,25 @@ class Filters(unittest.TestCase):
         broad.keep_only(None)
         self.assertEqual(pairs(broad.candidates("edge_edge")), all_pairs("edge_edge", v, edges, faces, 0.125))
 
+    def test_functions_that_use_the_broad_phase_that_asks_them(self):
+        v, edges, faces = sheet(10, 6)
+        broad = kbvh.BroadPhase()
+        broad.build(v, edges, faces, radius=0.125)
+        uses = [
+            lambda: broad.candidates("edge_edge"),
+            lambda: broad.keep_only(None),
+            lambda: broad.update(v),
+            lambda: broad.build(v, edges, faces),
+            broad.clear_filters,
+        ]
+        for use in uses:
+            broad.keep_only(lambda kind, found, use=use: use() or np.ones(len(found), bool))
+            with self.assertRaisesRegex(RuntimeError, "the broad phase that asks the filter"):
+                broad.candidates("edge_edge")
+        # It goes on as before, and its numbers can be asked for.
+        broad.keep_only(lambda kind, found: np.full(len(found), broad.detections > 0))
+        self.assertEqual(pairs(broad.candidates("edge_edge")), all_pairs("edge_edge", v, edges, faces, 0.125))
+
 
 class Edits(unittest.TestCase):
     def test_elements_and_changes(self):

@@ -92,6 +92,26 @@ TEST(BroadPhaseInC, ErrorsAreTexts) {
   EXPECT_EQ(kbvh_broad_phase_update_moved(broad.get(), &v, moved, 2), -1);
   EXPECT_STREQ(kbvh_broad_phase_error(broad.get()), "vertex 36 moved, but there are 36");
   EXPECT_EQ(kbvh_broad_phase_update_moved(broad.get(), &v, moved, 1), 0);
+  // Null pointers that stand for numbers.
+  const auto says = [&](int status, const char* what) {
+    EXPECT_EQ(status, -1) << what;
+    EXPECT_EQ(kbvh_broad_phase_error(broad.get()), std::string(what) + " is a null pointer");
+  };
+  kbvh_positions nowhere = v;
+  nowhere.data = nullptr;
+  std::uint32_t first[3];
+  says(kbvh_broad_phase_build(broad.get(), &v, nullptr, nullptr, 1, nullptr, 0, 0.1), "edges");
+  says(kbvh_broad_phase_build(broad.get(), &v, nullptr, nullptr, 0, nullptr, 1, 0.1), "faces");
+  says(kbvh_broad_phase_build(broad.get(), &v, &nowhere, nullptr, 0, nullptr, 0, 0.1),
+       "the data of positions");
+  says(kbvh_broad_phase_update(broad.get(), &nowhere, nullptr), "the data of positions");
+  says(kbvh_broad_phase_update_moved(broad.get(), &v, nullptr, 1), "moved");
+  says(kbvh_broad_phase_insert(broad.get(), nullptr, nullptr, 1, nullptr, 0, first), "edges");
+  says(kbvh_broad_phase_insert(broad.get(), nullptr, nullptr, 0, nullptr, 1, first), "faces");
+  says(kbvh_broad_phase_remove(broad.get(), KBVH_FACE, nullptr, 1), "ids");
+  says(kbvh_broad_phase_set_vertex_groups(broad.get(), nullptr, 1), "groups");
+  EXPECT_EQ(kbvh_broad_phase_update_moved(broad.get(), &v, nullptr, 0), 0);
+  EXPECT_EQ(kbvh_broad_phase_remove(broad.get(), KBVH_FACE, nullptr, 0), 0);
   // The mesh is still the one that was taken.
   EXPECT_EQ(kbvh_broad_phase_candidates(broad.get(), KBVH_EDGE_EDGE, &pairs, &count), 0);
   EXPECT_EQ(count, brute_force(mesh, CandidateKind::edge_edge, 0.1F).size());

@@ -178,6 +178,25 @@ TEST(CurvedPlans, HullsEncloseCurves) {
   }
 }
 
+// Short parts around the top of a parabola, x = -(s - 1/2)^2: the distances of the curve from its chord and
+// from zero are of one size, so that a hull has to know the length of the part to many digits.
+TEST(CurvedPlans, HullsOfShortPartsEncloseTheTopOfAParabola) {
+  const FlightPlans<double> plans(1, {0.1, 0.8}, {-0.25, 0, 0, -0.25, 0, 0}, {{{1, 0, 0}, {}}});
+  const CurvedPiece<double> piece = plans.curved_piece(0, 0, 0);
+  Random random(5);
+  double first[6], last[6];
+  for (int i = 0; i < 600; ++i) {
+    const double half = 0.35 * std::ldexp(1 + 0.5 * random.unit(), -12 - i % 12),
+                 middle = 0.45 + 0.1 * half * random.unit(), begin = middle - half, end = middle + half;
+    plans.evaluate_hull(begin, end, begin, first);
+    plans.evaluate_hull(begin, end, end, last);
+    const Rational t = (Rational(begin) + Rational(end)) / 2, x = rational_value(piece, t),
+                   lower = (Rational(first[0]) + Rational(last[0])) / 2,
+                   upper = (Rational(first[3]) + Rational(last[3])) / 2;
+    EXPECT_TRUE(lower <= x && x <= upper) << begin << " to " << end;
+  }
+}
+
 TEST(CurvedPlans, HashesTellCurvesApart) {
   const Scene<float> curved = curved_scene<float>("curved_gravity").scene,
                      lines = synthetic_scene<float>("sheets").scene;
@@ -230,6 +249,30 @@ TEST(CurvedPlans, ContestantsSayWhetherTheyTakeThem) {
   EXPECT_EQ(unsuitable_bodies(info, synthetic_scene<float>("four_bodies_own_keyframes").scene), "");
   info.can.curves = true;
   EXPECT_EQ(unsuitable_bodies(info, curved), "");
+}
+
+// A curve may leave the range of a contestant although its keyframes are within.
+TEST(CurvedPlans, StayWithinTheRangeOfAContestant) {
+  const auto refused = [](double most, float bend) {
+    Scene<float> scene;
+    Body<float>& body = scene.bodies.emplace_back();
+    body.name = "arc";
+    body.plans = FlightPlans<float>(1, {0, 1, 2}, {0, 0, 0, 1, 0, 0, 1, 0, 0}, {{}, {{0, bend, 0}, {}}});
+    Info info;
+    info.id = "near";
+    info.can.curves = true;
+    info.max_coordinate = most;
+    return unsuitable_bodies(info, scene);
+  };
+  EXPECT_EQ(refused(2.5, 8), "");
+  EXPECT_TRUE(refused(1.5, 8).starts_with(
+      "takes coordinates up to 1.5, but vertex 0 of body 'arc' may come to y = 2"));
+  EXPECT_TRUE(refused(1.5, 8).ends_with(" after keyframe 1"));
+  EXPECT_EQ(refused(2.5, -8), "");
+  EXPECT_TRUE(refused(1.5, -8).starts_with(
+      "takes coordinates up to 1.5, but vertex 0 of body 'arc' may come to y = -2"));
+  EXPECT_EQ(refused(1.5, 0), "");
+  EXPECT_TRUE(refused(0.5, 8).ends_with("is at x = 1 at keyframe 1"));
 }
 
 }  // namespace

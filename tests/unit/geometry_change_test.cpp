@@ -98,6 +98,35 @@ TEST(GeometryChange, WhatIsWrongIsRefusedAndNothingChanges) {
   EXPECT_EQ(changing.scene().bodies[0].primitives.live_count(), 148u);
 }
 
+// The caller's array has no place for more vertices; primitives may come and go.
+TEST(GeometryChange, BodiesWhosePositionsAreHandedInGetNoVertices) {
+  Scene<float> scene = synthetic_scene<float>("static_obstacle").scene;
+  const std::uint32_t count = scene.bodies[0].plans.vertex_count();
+  const float* const at = scene.bodies[0].plans.keyframe(0);
+  std::vector<float> positions(at, at + std::size_t(3) * count);
+  scene.bodies[0].plans = FlightPlans<float>::handed_in(count, positions);
+  positions.push_back(0);
+  Playback<float> playback(scene);
+  playback.hand_in(0, positions.data());
+  ChangingScene<float> changing(scene);
+  GeometryChange<float> added;
+  added.vertices.resize(1);
+  try {
+    changing.apply(added, playback);
+    ADD_FAILURE() << "was not refused";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("body 0, whose positions are handed in"), std::string::npos)
+        << error.what();
+  }
+  EXPECT_EQ(changing.scene().bodies[0].plans.vertex_count(), count);
+  EXPECT_EQ(playback.plans(0).vertex_count(), count);
+  GeometryChange<float> changed;
+  changed.removed_primitives.push_back({0, 0});
+  changed.primitives.push_back({0, {0, 1, 2}});
+  changing.apply(changed, playback);
+  EXPECT_EQ(changing.scene().bodies[0].primitives.live_count(), scene.bodies[0].primitives.live_count());
+}
+
 TEST(GeometryChange, NewVerticesFollowTheirPlans) {
   const auto test = synthetic_scene<float>("static_obstacle");
   Playback<float> playback(test.scene);

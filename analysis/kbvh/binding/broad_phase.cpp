@@ -54,13 +54,23 @@ class PairChoice {
   static std::size_t keep(void* self, kbvh_candidate_kind kind, std::uint32_t* pairs, std::size_t count) {
     return static_cast<PairChoice*>(self)->ask(kind, pairs, count);
   }
+  /// Whether the function is at work.
+  bool asks() const { return asks_; }
   /// Raises the exception of the last search, if there was one.
   void raise() {
     if (const std::exception_ptr error = std::exchange(error_, nullptr)) std::rethrow_exception(error);
   }
 
  private:
+  struct Asking {
+    explicit Asking(bool& flag) : asks(flag) { asks = true; }
+    ~Asking() { asks = false; }
+    Asking(const Asking&) = delete;
+    Asking& operator=(const Asking&) = delete;
+    bool& asks;
+  };
   std::size_t ask(kbvh_candidate_kind kind, std::uint32_t* pairs, std::size_t count) {
+    const Asking asking(asks_);
     try {
       const py::array shown =
           numbers_of(std::vector<std::uint32_t>(pairs, pairs + 2 * count), {py::ssize_t(count), 2});
@@ -85,6 +95,7 @@ class PairChoice {
 
   py::object choose_;
   std::exception_ptr error_;
+  bool asks_ = false;
 };
 
 class PythonBroadPhase {
@@ -103,32 +114,31 @@ class PythonBroadPhase {
     const Positions begin(v0, type_, !v1 ? "V" : "V0");
     const std::optional<Positions> end = other(v1);
     const std::vector<std::int32_t> e = rows_of(edges, 2, "E"), f = rows_of(faces, 3, "F");
-    check(kbvh_broad_phase_build(handle_.get(), begin.view(), end ? end->view() : nullptr, e.data(),
-                                 e.size() / 2, f.data(), f.size() / 3, radius));
+    check(kbvh_broad_phase_build(handle(), begin.view(), end ? end->view() : nullptr, e.data(), e.size() / 2,
+                                 f.data(), f.size() / 3, radius));
     choice_.reset();
   }
   void update(const py::array& v0, const std::optional<py::array>& v1) {
     const Positions begin(v0, type_, !v1 ? "V" : "V0");
     const std::optional<Positions> end = other(v1);
-    check(kbvh_broad_phase_update(handle_.get(), begin.view(), end ? end->view() : nullptr));
+    check(kbvh_broad_phase_update(handle(), begin.view(), end ? end->view() : nullptr));
   }
   void update_moved(const py::array& v, const py::object& moved) {
     const Positions positions(v, type_, "V");
     const Ids ids(moved, "the vertices that moved");
-    check(
-        kbvh_broad_phase_update_moved(handle_.get(), positions.view(), ids.span().data(), ids.span().size()));
+    check(kbvh_broad_phase_update_moved(handle(), positions.view(), ids.span().data(), ids.span().size()));
   }
-  void valid_for(Real displacement) { check(kbvh_broad_phase_valid_for(handle_.get(), displacement)); }
+  void valid_for(Real displacement) { check(kbvh_broad_phase_valid_for(handle(), displacement)); }
   py::array candidates(const std::string& kind) {
     const std::uint32_t* pairs = nullptr;
     std::size_t count = 0;
-    check(kbvh_broad_phase_candidates(handle_.get(), kind_of(kind), &pairs, &count));
+    check(kbvh_broad_phase_candidates(handle(), kind_of(kind), &pairs, &count));
     return copied(pairs, count);
   }
   py::array within(const std::string& kind, Real distance) {
     const std::uint32_t* pairs = nullptr;
     std::size_t count = 0;
-    check(kbvh_broad_phase_within(handle_.get(), kind_of(kind), distance, &pairs, &count));
+    check(kbvh_broad_phase_within(handle(), kind_of(kind), distance, &pairs, &count));
     return copied(pairs, count);
   }
   py::tuple insert(const std::optional<py::array>& v, const py::object& edges, const py::object& faces) {
@@ -136,58 +146,58 @@ class PythonBroadPhase {
     if (v) positions.emplace(*v, type_, "V");
     const std::vector<std::int32_t> e = rows_of(edges, 2, "E"), f = rows_of(faces, 3, "F");
     std::uint32_t first[3] = {};
-    check(kbvh_broad_phase_insert(handle_.get(), positions ? positions->view() : nullptr, e.data(),
-                                  e.size() / 2, f.data(), f.size() / 3, first));
+    check(kbvh_broad_phase_insert(handle(), positions ? positions->view() : nullptr, e.data(), e.size() / 2,
+                                  f.data(), f.size() / 3, first));
     return py::make_tuple(first[0], first[1], first[2]);
   }
   void remove(const std::string& element, const py::object& ids) {
     const Ids removed(ids, "the elements to remove");
-    check(kbvh_broad_phase_remove(handle_.get(), element_of(element), removed.span().data(),
-                                  removed.span().size()));
+    check(
+        kbvh_broad_phase_remove(handle(), element_of(element), removed.span().data(), removed.span().size()));
   }
   void set_groups(const std::string& element, const py::object& groups, const py::object& masks) {
     const std::vector<kbvh_group_mask> list = groups_of(groups, masks);
-    check(kbvh_broad_phase_set_groups(handle_.get(), element_of(element), list.data(), list.size()));
+    check(kbvh_broad_phase_set_groups(handle(), element_of(element), list.data(), list.size()));
   }
   void set_vertex_groups(const py::object& groups, const py::object& masks) {
     const std::vector<kbvh_group_mask> list = groups_of(groups, masks);
-    check(kbvh_broad_phase_set_vertex_groups(handle_.get(), list.data(), list.size()));
+    check(kbvh_broad_phase_set_vertex_groups(handle(), list.data(), list.size()));
   }
   void exclude(const std::string& kind, const py::object& pairs) {
     const Ids ids(pairs, "the excluded pairs");
     if (!ids.span().empty() && (ids.axes() != 2 || py::array(pairs).shape(1) != 2))
       throw std::invalid_argument("the excluded pairs have to have the shape (n, 2)");
-    check(kbvh_broad_phase_exclude(handle_.get(), kind_of(kind), ids.span().data(), ids.span().size() / 2));
+    check(kbvh_broad_phase_exclude(handle(), kind_of(kind), ids.span().data(), ids.span().size() / 2));
   }
-  void use_threads(std::uint32_t threads) { check(kbvh_broad_phase_use_threads(handle_.get(), threads)); }
-  void exclude_rings(std::uint32_t rings) { check(kbvh_broad_phase_exclude_rings(handle_.get(), rings)); }
+  void use_threads(std::uint32_t threads) { check(kbvh_broad_phase_use_threads(handle(), threads)); }
+  void exclude_rings(std::uint32_t rings) { check(kbvh_broad_phase_exclude_rings(handle(), rings)); }
   py::array self_intersections() {
     const std::uint32_t* pairs = nullptr;
     std::size_t count = 0;
-    check(kbvh_broad_phase_self_intersections(handle_.get(), &pairs, &count));
+    check(kbvh_broad_phase_self_intersections(handle(), &pairs, &count));
     return copied(pairs, count);
   }
   void keep_only(const py::object& choose) {
     auto choice = choose.is_none() ? nullptr : std::make_unique<PairChoice>(choose);
-    check(kbvh_broad_phase_keep_only(handle_.get(), choice ? &PairChoice::keep : nullptr, choice.get()));
+    check(kbvh_broad_phase_keep_only(handle(), choice ? &PairChoice::keep : nullptr, choice.get()));
     choice_ = std::move(choice);
   }
   void clear_filters() {
-    check(kbvh_broad_phase_clear_filters(handle_.get()));
+    check(kbvh_broad_phase_clear_filters(handle()));
     choice_.reset();
   }
   py::tuple changes(const std::string& kind, const std::optional<double>& distance) {
     const std::uint32_t *begun = nullptr, *ended = nullptr;
     std::size_t begun_count = 0, ended_count = 0;
-    check(distance ? kbvh_broad_phase_changes_within(handle_.get(), kind_of(kind), *distance, &begun,
-                                                     &begun_count, &ended, &ended_count)
-                   : kbvh_broad_phase_changes(handle_.get(), kind_of(kind), &begun, &begun_count, &ended,
+    check(distance ? kbvh_broad_phase_changes_within(handle(), kind_of(kind), *distance, &begun, &begun_count,
+                                                     &ended, &ended_count)
+                   : kbvh_broad_phase_changes(handle(), kind_of(kind), &begun, &begun_count, &ended,
                                               &ended_count));
     return py::make_tuple(copied(begun, begun_count), copied(ended, ended_count));
   }
   py::object earliest_impact(Real separation) {
     kbvh_impact impact{};
-    check(kbvh_broad_phase_earliest_impact(handle_.get(), separation, &impact));
+    check(kbvh_broad_phase_earliest_impact(handle(), separation, &impact));
     if (impact.touches == 0) return py::none();
     return py::make_tuple(impact.begin, impact.end, name(CandidateKind(int(impact.kind))), impact.pair[0],
                           impact.pair[1]);
@@ -220,6 +230,14 @@ class PythonBroadPhase {
   }
   static py::array copied(const std::uint32_t* pairs, std::size_t count) {
     return numbers_of(std::vector<std::uint32_t>(pairs, pairs + 2 * count), {py::ssize_t(count), 2});
+  }
+  /// Returns the handle for a call. A filter must not use the object that asks it: the search goes on
+  /// afterwards, and the filter itself might be gone.
+  kbvh_broad_phase* handle() const {
+    if (choice_ && choice_->asks())
+      throw std::logic_error(
+          "a filter of pairs, or another thread, uses the broad phase that asks the filter");
+    return handle_.get();
   }
   void check(int status) const {
     if (status != 0 && choice_) choice_->raise();
