@@ -33,6 +33,10 @@ class Body:
     whatever its first corner; from then on it is the union of these triangles. Arrays are used as they are: nothing is copied
     before a world is made.
 
+    With `bends` or `twists`, each [keyframe - 1][vertex][3], vertices move on curves instead of lines: with the share s of the
+    way from one keyframe to the next, from 0 to 1, a coordinate is x0 (1 - s) + x1 s + s (1 - s) (bend + twist s). Strategies
+    that foresee straight lines refuse such a body.
+
     >>> import numpy as np
     >>> kbvh.Body([[0, 1, 2]], np.zeros((2, 3, 3)), times=[0, 1]).keyframes
     2
@@ -47,6 +51,9 @@ class Body:
     known: bool = True
     #: Whether pairs within the body are requested, too.
     self_pairs: bool = False
+    #: The curves between keyframes; None: all zero.
+    bends: Optional[npt.ArrayLike] = None
+    twists: Optional[npt.ArrayLike] = None
 
     def __post_init__(self) -> None:
         self.positions = np.asarray(self.positions)
@@ -60,6 +67,11 @@ class Body:
             raise ValueError(f"body '{self.name}': {_counted(np.size(self.times), 'time')}, but positions at {_counted(self.keyframes, 'keyframe')}")
         if not self.known and self.positions.ndim == 3:
             raise ValueError(f"body '{self.name}': an unknown motion has no keyframes")
+        for word, numbers in (("bends", self.bends), ("twists", self.twists)):
+            if numbers is not None and np.shape(numbers) != (self.keyframes - 1, self.vertices, 3):
+                raise ValueError(
+                    f"body '{self.name}': {word} are [{self.keyframes - 1}][{self.vertices}][3], not {list(np.shape(numbers))}"
+                )
 
     @property
     def keyframes(self) -> int:

@@ -122,7 +122,9 @@ class World:
         for body in self.scene.bodies:
             times = None if not body.known else [0.0] if body.times is None else body.times
             try:
-                self._core.add_body(body.name, body.indices, body.offsets, body.shape, times, body.positions)
+                self._core.add_body(
+                    body.name, body.indices, body.offsets, body.shape, times, body.positions, body.bends, body.twists
+                )
             except ValueError as reason:
                 if f"'{body.name}'" in str(reason):
                     raise

@@ -18,7 +18,23 @@ const char* word(io::MeshKind kind) {
                                         : "control_nets";
 }
 
-/// Hands a mesh's arrays to numpy, without a copy.
+/// Returns one coefficient of the curves of all segments, [segment][vertex][3]; None where all are zero.
+py::object coefficients_of(const io::AnimatedMesh& mesh, std::vector<double> io::AnimatedMesh::Bends::*list) {
+  const std::size_t scalars = std::size_t(3) * mesh.vertex_count;
+  std::vector<double> all;
+  bool any = false;
+  for (const io::AnimatedMesh::Bends& segment : mesh.bends) {
+    const std::vector<double>& values = segment.*list;
+    any = any || !values.empty();
+    all.insert(all.end(), values.begin(), values.end());
+    all.insert(all.end(), values.empty() ? scalars : 0, 0.0);
+  }
+  if (!any) return py::none();
+  return numbers_of(std::move(all),
+                    {py::ssize_t(mesh.bends.size()), py::ssize_t(mesh.vertex_count), py::ssize_t(3)});
+}
+
+/// Hands a mesh's arrays to numpy, without a copy but for its curves.
 py::dict body_of(io::AnimatedMesh& mesh, bool self) {
   py::dict out;
   const auto keyframes = py::ssize_t(mesh.keyframe_times.size()), vertices = py::ssize_t(mesh.vertex_count);
@@ -26,6 +42,8 @@ py::dict body_of(io::AnimatedMesh& mesh, bool self) {
   out["shape"] = word(mesh.kind);
   const auto indices = py::ssize_t(mesh.primitive_vertices.size()),
              offsets = py::ssize_t(mesh.primitive_offsets.size());
+  out["bends"] = coefficients_of(mesh, &io::AnimatedMesh::Bends::bend);
+  out["twists"] = coefficients_of(mesh, &io::AnimatedMesh::Bends::twist);
   out["indices"] = numbers_of(std::move(mesh.primitive_vertices), {indices});
   out["offsets"] = numbers_of(std::move(mesh.primitive_offsets), {offsets});
   out["times"] = numbers_of(std::move(mesh.keyframe_times), {keyframes});

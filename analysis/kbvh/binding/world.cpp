@@ -64,7 +64,8 @@ class PythonWorld {
       : precision_(precision), world_(precision_of(precision)) {}
 
   std::uint32_t add_body(const std::string& name, const py::object& indices, const py::object& offsets,
-                         const std::string& shape, const py::object& times, const py::object& positions) {
+                         const std::string& shape, const py::object& times, const py::object& positions,
+                         const py::object& bends, const py::object& twists) {
     const std::string what = "body '" + name + "'";
     const Ids vertices(indices, what + ", its indices");
     std::unique_ptr<Ids> starts;
@@ -77,10 +78,16 @@ class PythonWorld {
     numbers.check_points(what + ", its positions");
     const Connectivity connectivity{
         vertices.span(), starts ? starts->span() : std::span<const std::uint32_t>(), shape_of(shape)};
+    std::vector<double> of_bends, of_twists;
+    if (!bends.is_none()) of_bends = doubles_of(bends, what + ", its bends");
+    if (!twists.is_none()) of_twists = doubles_of(twists, what + ", its twists");
+    if (times.is_none() && !(of_bends.empty() && of_twists.empty()))
+      throw std::invalid_argument(what + " has curves, but no keyframes");
     const auto add = [&](auto span) {
       if (times.is_none()) return world_.add_body(name, connectivity, span);
       const std::vector<double> keyframes = doubles_of(times, what + ", its times");
-      return world_.add_body(name, connectivity, std::span<const double>(keyframes), span);
+      return world_.add_body(name, connectivity, std::span<const double>(keyframes), span,
+                             {of_bends, of_twists});
     };
     const std::uint32_t body = numbers.single() ? add(numbers.floats()) : add(numbers.doubles());
     given_.emplace_back();
@@ -412,7 +419,7 @@ void bind_world(py::module_& module) {
       .def_property_readonly("precision", method(&PythonWorld::precision))
       .def_property_readonly("time", method(&PythonWorld::time))
       .def("add_body", method(&PythonWorld::add_body), arg("name"), arg("indices"), arg("offsets"),
-           arg("shape"), arg("times"), arg("positions"))
+           arg("shape"), arg("times"), arg("positions"), arg("bends"), arg("twists"))
       .def("add_pair", method(&PythonWorld::add_pair), arg("body_a"), arg("body_b"))
       .def("start", method(&PythonWorld::start), arg("strategy"), arg("params"), arg("t"), arg("topology"))
       .def("reset", method(&PythonWorld::reset), arg("t"))
