@@ -133,6 +133,16 @@ class Conformance(unittest.TestCase):
         (verdict,) = kbvh.check("py_swapped", kbvh.small_scenes()[:1], precisions=["float32"])
         self.assertTrue(verdict.holds, str(verdict))
 
+    def test_curves_are_for_strategies_that_foresee_no_lines(self):
+        thrown = [kbvh.scene("thrown_shards", triangles=60, keyframes=3)]
+        (verdict,) = kbvh.check(Boxes, thrown, precisions=["float32"])
+        self.assertTrue(verdict.holds and not verdict.left_out, str(verdict))
+        variant("py_foresees_lines", foresight="next_keyframe")
+        for id in ("py_foresees_lines", "auto"):
+            (verdict,) = kbvh.check(id, thrown, precisions=["float32"])
+            self.assertTrue(verdict.left_out, str(verdict))
+            self.assertIn("foresees linear motion only", verdict.why)
+
     def test_foresight_is_what_was_declared(self):
         seen = []
 
