@@ -204,6 +204,29 @@ class Conformance(unittest.TestCase):
             with self.assertRaises(KeyboardInterrupt):
                 call()
 
+    def test_a_world_at_work_takes_no_positions(self):
+        worlds, said = [], []
+        lies = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], dtype="f4")
+
+        def advance(self):
+            for world in worlds:
+                try:
+                    world.set_positions(1, kbvh.padded(lies + np.float32([0, 0, 9])))
+                except RuntimeError as error:
+                    said.append(str(error))
+            Boxes.advance(self)
+
+        variant("py_sets_positions", advance=advance)
+        bodies = [kbvh.Body([[0, 1, 2]], lies, known=False, name=name) for name in ("a", "b")]
+        worlds.append(kbvh.World(bodies, "py_sets_positions"))
+        for step in range(1, 20):
+            self.assertTrue(worlds[0].set_positions(1, kbvh.padded(lies + np.float32([0, 0, step]))))
+            worlds[0].advance(step)
+            np.full(10, 7, dtype="f4")  # would take the place of memory that was freed
+            self.assertEqual(worlds[0].positions(1)[0, 2], step)
+        self.assertEqual(len(said), 19)
+        self.assertIn("at work", said[0])
+
     def test_what_cannot_be_registered(self):
         for members, text in [
             ({"id": "bottom_up"}, "is a strategy of kbvh"),

@@ -66,6 +66,7 @@ class PythonWorld {
   std::uint32_t add_body(const std::string& name, const py::object& indices, const py::object& offsets,
                          const std::string& shape, const py::object& times, const py::object& positions,
                          const py::object& bends, const py::object& twists) {
+    check_idle();
     const std::string what = "body '" + name + "'";
     const Ids vertices(indices, what + ", its indices");
     std::unique_ptr<Ids> starts;
@@ -93,7 +94,10 @@ class PythonWorld {
     given_.emplace_back();
     return body;
   }
-  void add_pair(Whole a, Whole b) { world_.add_pair(a, b); }
+  void add_pair(Whole a, Whole b) {
+    check_idle();
+    world_.add_pair(a, b);
+  }
 
   void start(const std::string& strategy, const Words& params, Real t, const Words& topology) {
     alone([&] { world_.start(strategy, params, t, topology); });
@@ -138,6 +142,8 @@ class PythonWorld {
 
   /// Returns whether the array is used where it lies: one of 3n + 1 numbers in the world's precision.
   bool set_positions(Whole body, const py::object& positions, const py::object& moved) {
+    // A world on its way to another time would keep other arrays alive than it reads.
+    check_idle();
     const std::string what = "the positions of body " + std::to_string(body);
     const Numbers numbers(positions, what);
     if (numbers.array().ndim() > 1) numbers.check_points(what);
@@ -336,10 +342,13 @@ class PythonWorld {
     return numbers.size() % 3 == 1 && numbers.single() == (precision_ == "float32");
   }
 
-  template <class Work>
-  auto alone(Work&& work) -> decltype(work()) {
+  void check_idle() const {
     if (busy_)
       throw std::logic_error("this world is at work, in another thread or in a strategy that asks it");
+  }
+  template <class Work>
+  auto alone(Work&& work) -> decltype(work()) {
+    check_idle();
     busy_ = true;
     struct Done {
       bool& busy;
