@@ -109,6 +109,9 @@ def _unsuitable(strategy: dict[str, Any], play: Scene, precision: str) -> str:
         return f"it does not exist in {precision}"
     if any(a == b for a, b in play.pairs_asked() or ()) and "self_pairs" not in strategy["abilities"]:
         return "it does not answer pairs within a body"
+    bent = any(np.any(numbers) for body in play.bodies for numbers in (body.bends, body.twists) if numbers is not None)
+    if bent and "curves" not in strategy["abilities"]:
+        return "it foresees linear motion only, and vertices move on curves"
     if play.radius is not None:
         return "" if "control_nets" in strategy["primitives"] else "it does not take a radius"
     others = [body.shape for body in play.bodies if body.shape not in strategy["primitives"]]

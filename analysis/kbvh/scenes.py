@@ -33,6 +33,10 @@ class Body:
     whatever its first corner; from then on it is the union of these triangles. Arrays are used as they are: nothing is copied
     before a world is made.
 
+    With `bends` or `twists`, each [keyframe - 1][vertex][3], vertices move on curves instead of lines: with the share s of the
+    way from one keyframe to the next, from 0 to 1, a coordinate is x0 (1 - s) + x1 s + s (1 - s) (bend + twist s). Strategies
+    that foresee straight lines refuse such a body.
+
     `over` is another body whose vertices this one consists of, as the edges of a mesh do: it then has the positions, times and
     motion of that body, which comes before it in a scene. Primitives with a common vertex are no pair, also in two such bodies.
     `elements` makes such bodies.
@@ -54,6 +58,9 @@ class Body:
     known: bool = True
     #: Whether pairs within the body are requested, too.
     self_pairs: bool = False
+    #: The curves between keyframes; None: all zero.
+    bends: Optional[npt.ArrayLike] = None
+    twists: Optional[npt.ArrayLike] = None
     #: The body whose vertices this one consists of; None: its own.
     over: Optional[Body] = field(default=None, repr=False)
 
@@ -61,9 +68,10 @@ class Body:
         if self.over is not None:
             if not isinstance(self.over, Body):
                 raise TypeError(f"body '{self.name}': over is a Body, not {type(self.over).__name__}")
-            if np.size(self.positions) or self.times is not None or not self.known:
-                raise ValueError(f"body '{self.name}': positions, times and known are those of '{self.over.name}'")
+            if np.size(self.positions) or self.times is not None or not self.known or self.bends is not None or self.twists is not None:
+                raise ValueError(f"body '{self.name}': positions, times, curves and known are those of '{self.over.name}'")
             self.positions, self.times, self.known = self.over.positions, self.over.times, self.over.known
+            self.bends, self.twists = self.over.bends, self.over.twists
         self.positions = np.asarray(self.positions)
         if self.positions.ndim not in (2, 3) or self.positions.shape[-1] != 3:
             raise ValueError(
@@ -75,6 +83,11 @@ class Body:
             raise ValueError(f"body '{self.name}': {_counted(np.size(self.times), 'time')}, but positions at {_counted(self.keyframes, 'keyframe')}")
         if not self.known and self.positions.ndim == 3:
             raise ValueError(f"body '{self.name}': an unknown motion has no keyframes")
+        for word, numbers in (("bends", self.bends), ("twists", self.twists)):
+            if numbers is not None and np.shape(numbers) != (self.keyframes - 1, self.vertices, 3):
+                raise ValueError(
+                    f"body '{self.name}': {word} are [{self.keyframes - 1}][{self.vertices}][3], not {list(np.shape(numbers))}"
+                )
 
     @property
     def keyframes(self) -> int:

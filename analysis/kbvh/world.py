@@ -137,7 +137,9 @@ class World:
             times = None if not body.known else [0.0] if body.times is None else body.times
             try:
                 if body.over is None:
-                    self._core.add_body(body.name, body.indices, body.offsets, body.shape, times, body.positions)
+                    self._core.add_body(
+                        body.name, body.indices, body.offsets, body.shape, times, body.positions, body.bends, body.twists
+                    )
                 else:
                     over = _number_of(body.over, self.scene.bodies[:i])
                     self._core.add_body_over(over, body.name, body.indices, body.offsets, body.shape)

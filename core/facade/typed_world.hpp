@@ -131,14 +131,34 @@ struct TypedWorld {
 
   template <class T>
   std::uint32_t add(const std::string& name, const Connectivity& connectivity, std::span<const double> times,
-                    std::span<const T> positions) {
+                    std::span<const T> positions, const WorldCurves& curves) {
     const std::size_t frames = times.size();
     if (frames == 0 || positions.size() % (3 * frames) != 0)
       throw std::invalid_argument("body '" + name + "': " + std::to_string(positions.size()) +
                                   " coordinates for " + std::to_string(frames) + " keyframes");
     const auto vertices = std::uint32_t(positions.size() / (3 * frames));
     return add(name, connectivity,
-               FlightPlans<S>(vertices, {times.begin(), times.end()}, converted<S>(positions)));
+               FlightPlans<S>(vertices, {times.begin(), times.end()}, converted<S>(positions),
+                              bends_of(name, frames - 1, vertices, curves)));
+  }
+  static std::vector<SegmentBends<S>> bends_of(const std::string& name, std::size_t segments,
+                                               std::uint32_t vertices, const WorldCurves& curves) {
+    std::vector<SegmentBends<S>> bends;
+    if (curves.bends.empty() && curves.twists.empty()) return bends;
+    const std::size_t scalars = std::size_t(3) * vertices;
+    bends.resize(segments);
+    const auto take = [&](std::span<const double> numbers, std::vector<S> SegmentBends<S>::*list) {
+      if (numbers.empty()) return;
+      if (numbers.size() != segments * scalars)
+        throw std::invalid_argument("body '" + name + "': " + std::to_string(numbers.size()) +
+                                    " numbers for the curves of " + std::to_string(vertices) +
+                                    " vertices in " + std::to_string(segments) + " segments");
+      for (std::size_t k = 0; k < segments; ++k)
+        bends[k].*list = converted<S>(numbers.subspan(k * scalars, scalars));
+    };
+    take(curves.bends, &SegmentBends<S>::bend);
+    take(curves.twists, &SegmentBends<S>::twist);
+    return bends;
   }
   template <class T>
   std::uint32_t add(const std::string& name, const Connectivity& connectivity, std::span<const T> positions) {

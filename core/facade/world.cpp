@@ -34,12 +34,14 @@ decltype(auto) World::in_scalar(const Work& work) const {
 // ---- The scene, before `start`
 
 std::uint32_t World::add_body(const std::string& name, const Connectivity& connectivity,
-                              std::span<const double> times, std::span<const float> positions) {
-  return in_scalar([&](auto& world) { return world.add(name, connectivity, times, positions); });
+                              std::span<const double> times, std::span<const float> positions,
+                              const WorldCurves& curves) {
+  return in_scalar([&](auto& world) { return world.add(name, connectivity, times, positions, curves); });
 }
 std::uint32_t World::add_body(const std::string& name, const Connectivity& connectivity,
-                              std::span<const double> times, std::span<const double> positions) {
-  return in_scalar([&](auto& world) { return world.add(name, connectivity, times, positions); });
+                              std::span<const double> times, std::span<const double> positions,
+                              const WorldCurves& curves) {
+  return in_scalar([&](auto& world) { return world.add(name, connectivity, times, positions, curves); });
 }
 std::uint32_t World::add_body(const std::string& name, const Connectivity& connectivity,
                               std::span<const float> positions) {

@@ -31,6 +31,14 @@ struct Connectivity {
   Shape shape = Shape::polygons;
 };
 
+/// The curves of a body's vertices between keyframes. With the share s of a segment, from 0 to 1, a
+/// coordinate is x0 (1 - s) + x1 s + s (1 - s) (bend + twist s), where x0 and x1 are its values at the
+/// keyframes. Each list is [segment][vertex][3], or empty: all zero. Without twists vertices move on
+/// parabolas.
+struct WorldCurves {
+  std::span<const double> bends{}, twists{};
+};
+
 /// Two primitives that intersect, as body and primitive ids. body_a < body_b, or body_a = body_b and
 /// primitive_a < primitive_b.
 struct WorldPair {
@@ -258,11 +266,15 @@ class World {
   // ---- The scene, before `start`
 
   /// Adds a body with known motion: `positions` is [keyframe][vertex][3] for keyframes at `times`, between
-  /// which vertices move on straight lines. A body with one keyframe rests. Returns the body's id: 0, 1, ...
+  /// which vertices move on straight lines, or on `curves`. A body with one keyframe rests. Strategies that
+  /// foresee straight lines only refuse a body with curves, whose plans cannot change. Returns the body's id:
+  /// 0, 1, ...
   std::uint32_t add_body(const std::string& name, const Connectivity& connectivity,
-                         std::span<const double> times, std::span<const float> positions);
+                         std::span<const double> times, std::span<const float> positions,
+                         const WorldCurves& curves = {});
   std::uint32_t add_body(const std::string& name, const Connectivity& connectivity,
-                         std::span<const double> times, std::span<const double> positions);
+                         std::span<const double> times, std::span<const double> positions,
+                         const WorldCurves& curves = {});
   /// Adds a body with unknown motion, whose positions are set frame by frame. `positions` holds its positions
   /// until then. Only strategies without foresight accept such a body.
   std::uint32_t add_body(const std::string& name, const Connectivity& connectivity,

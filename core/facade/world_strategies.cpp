@@ -45,7 +45,8 @@ std::vector<std::string> words(const Capabilities& can) {
                                               {can.contacts, "contacts"},
                                               {can.rays, "rays"},
                                               {can.probes, "within"},
-                                              {can.changes, "changes"}};
+                                              {can.changes, "changes"},
+                                              {can.curves, "curves"}};
   std::vector<std::string> out;
   for (const auto& [has, word] : all)
     if (has) out.push_back(word);

@@ -25,7 +25,8 @@ constexpr const char* scene_examples = R"(Examples:
   kbvh scene tablecloth --triangles 500 --keyframes 20 --out tablecloth.json
 Prints counts and a measure of the motion: the share of the sides of a binary tree (one triangle per leaf) whose
 realising vertex changes from one keyframe to the next. A folder gets every body as OBJ, with PC2 if it moves, and
-these numbers as card.json; a file ending in .obj gets all bodies at one keyframe, one after the other; a file ending in .json is a scene for the lab.)";
+these numbers as card.json; a file ending in .obj gets all bodies at one keyframe, one after the other; a file ending in .json is a scene for the lab. Files
+hold keyframes: curves between them are not written.)";
 
 constexpr std::uint32_t lab_frames_per_keyframe = 10;
 

@@ -139,8 +139,8 @@ class Wrong(unittest.TestCase):
         edge = kbvh.Body([0, 1], offsets=[0, 2], over=body, name="edge")
         for error, text, call in (
             (TypeError, "body 'edge': over is a Body, not int", lambda: kbvh.Body([0, 1], offsets=[0, 2], over=0, name="edge")),
-            (ValueError, "positions, times and known are those of 'face'", lambda: kbvh.Body([0, 1, 2], np.eye(3), over=body)),
-            (ValueError, "positions, times and known are those of 'face'", lambda: kbvh.Body([0, 1, 2], over=body, known=False)),
+            (ValueError, "positions, times, curves and known are those of 'face'", lambda: kbvh.Body([0, 1, 2], np.eye(3), over=body)),
+            (ValueError, "positions, times, curves and known are those of 'face'", lambda: kbvh.Body([0, 1, 2], over=body, known=False)),
             (ValueError, r"positions are \[vertex\]\[3\]", lambda: kbvh.Body([0, 1, 2])),
             (ValueError, "body 'edge': the body 'face', over whose vertices it is, must come before it", lambda: kbvh.World([edge, body])),
             (ValueError, "body 'edge': the body 'face', over whose vertices it is, must come before it", lambda: kbvh.World([edge])),

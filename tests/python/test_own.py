@@ -133,6 +133,16 @@ class Conformance(unittest.TestCase):
         (verdict,) = kbvh.check("py_swapped", kbvh.small_scenes()[:1], precisions=["float32"])
         self.assertTrue(verdict.holds, str(verdict))
 
+    def test_curves_are_for_strategies_that_foresee_no_lines(self):
+        thrown = [kbvh.scene("thrown_shards", triangles=60, keyframes=3)]
+        (verdict,) = kbvh.check(Boxes, thrown, precisions=["float32"])
+        self.assertTrue(verdict.holds and not verdict.left_out, str(verdict))
+        variant("py_foresees_lines", foresight="next_keyframe")
+        for id in ("py_foresees_lines", "auto"):
+            (verdict,) = kbvh.check(id, thrown, precisions=["float32"])
+            self.assertTrue(verdict.left_out, str(verdict))
+            self.assertIn("foresees linear motion only", verdict.why)
+
     def test_foresight_is_what_was_declared(self):
         seen = []
 
@@ -193,6 +203,29 @@ class Conformance(unittest.TestCase):
         ):
             with self.assertRaises(KeyboardInterrupt):
                 call()
+
+    def test_a_world_at_work_takes_no_positions(self):
+        worlds, said = [], []
+        lies = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], dtype="f4")
+
+        def advance(self):
+            for world in worlds:
+                try:
+                    world.set_positions(1, kbvh.padded(lies + np.float32([0, 0, 9])))
+                except RuntimeError as error:
+                    said.append(str(error))
+            Boxes.advance(self)
+
+        variant("py_sets_positions", advance=advance)
+        bodies = [kbvh.Body([[0, 1, 2]], lies, known=False, name=name) for name in ("a", "b")]
+        worlds.append(kbvh.World(bodies, "py_sets_positions"))
+        for step in range(1, 20):
+            self.assertTrue(worlds[0].set_positions(1, kbvh.padded(lies + np.float32([0, 0, step]))))
+            worlds[0].advance(step)
+            np.full(10, 7, dtype="f4")  # would take the place of memory that was freed
+            self.assertEqual(worlds[0].positions(1)[0, 2], step)
+        self.assertEqual(len(said), 19)
+        self.assertIn("at work", said[0])
 
     def test_what_cannot_be_registered(self):
         for members, text in [

@@ -75,7 +75,15 @@ class Files(unittest.TestCase):
 
 class SameAsTheProgram(unittest.TestCase):
     def test_worlds_count_what_studies_record(self):
-        description = {"builtin": "waving_sheet", "triangles": 200, "keyframes": 3}
+        self.assertGreater(self.least_pairs({"builtin": "waving_sheet", "triangles": 200, "keyframes": 3}), 0)
+
+    def test_worlds_count_what_studies_record_on_curves(self):
+        self.least_pairs({"builtin": "waving_sheet", "triangles": 200, "keyframes": 3, "curves": "smooth"})
+        self.least_pairs({"builtin": "thrown_shards", "triangles": 200, "keyframes": 3})
+
+    def least_pairs(self, description):
+        """Compares a world with a study in both precisions; returns the smaller number of pairs."""
+        sums = []
         for name, precision in (("float", "float32"), ("double", "float64")):
             with tempfile.TemporaryDirectory() as folder:
                 plan = {"scenes": [description], "strategies": ["bottom_up"], "l": 3, "scalars": [name], "repetitions": 1}
@@ -83,10 +91,30 @@ class SameAsTheProgram(unittest.TestCase):
             world = kbvh.World(kbvh.scene(description), "bottom_up", precision=precision)
             counts = [len(world.pairs()) for _ in world.play(l=3)]
             self.assertEqual((run["frames"], run["pairs"]), (len(counts), sum(counts)))
-            self.assertGreater(sum(counts), 0)
             counters = world.counters()
             for counter in ("values_written", "box_tests"):
                 self.assertEqual(round(run[f"{counter}_per_frame"] * run["frames"]), counters[counter], counter)
+            sums.append(sum(counts))
+        return min(sums)
+
+    def test_bodies_on_curves(self):
+        made = kbvh.scene("thrown_cloth", triangles=200, keyframes=3)
+        body = made.bodies[0]
+        world = kbvh.World(made, "bottom_up", precision="float64")
+        share = 0.25
+        world.reset(body.times[0] + share * (body.times[1] - body.times[0]))
+        chord = (1 - share) * body.positions[0] + share * body.positions[1]
+        curve = chord + share * (1 - share) * (body.bends[0] + body.twists[0] * share)
+        self.assertTrue(np.allclose(world.positions(0), curve, atol=1e-9))
+        self.assertGreater(np.abs(curve - chord).max(), 0.1)
+        self.assertIsNone(made.bodies[1].bends)
+        lines = kbvh.scene("thrown_cloth", triangles=200, keyframes=3, curves="lines").bodies[0]
+        self.assertIsNone(lines.bends)
+        self.assertTrue(np.array_equal(lines.positions, body.positions))
+        with self.assertRaisesRegex(kbvh.ConfigError, "foresees linear motion only"):
+            kbvh.World(made, "auto")
+        with self.assertRaisesRegex(ValueError, r"bends are \[1\]\[3\]\[3\], not \[2, 3, 3\]"):
+            kbvh.Body([0, 1, 2], np.zeros((2, 3, 3)), times=[0, 1], bends=np.zeros((2, 3, 3)))
 
     def test_every_built_in_scene_can_be_made(self):
         for name in kbvh.builtin_scenes():

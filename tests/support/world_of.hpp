@@ -1,5 +1,6 @@
 #pragma once
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "core/facade/world.hpp"
@@ -16,8 +17,13 @@ World world_of(const Scene<S>& scene) {
     const std::vector<S> positions(
         plans.keyframe(0),
         plans.keyframe(0) + std::size_t(3) * plans.keyframed_count() * plans.keyframe_count());
+    std::vector<double> bends, twists;
+    for (std::size_t k = 0; plans.curved() && k + 1 < plans.keyframe_count(); ++k)
+      for (const auto& [from, to] : {std::pair(plans.bends(k), &bends), std::pair(plans.twists(k), &twists)})
+        for (std::size_t i = 0; i < std::size_t(3) * plans.keyframed_count(); ++i)
+          to->push_back(from == nullptr ? 0 : double(from[i]));
     world.add_body(body.name, {body.primitives.vertices, body.primitives.offsets}, plans.keyframe_times(),
-                   std::span<const S>(positions));
+                   std::span<const S>(positions), {bends, twists});
   }
   for (const BodyPair& pair : scene.pairs) world.add_pair(pair.first, pair.second);
   return world;

@@ -10,6 +10,9 @@
 #include "core/contract/about.hpp"
 #include "core/contract/registry.hpp"
 #include "core/facade/world.hpp"
+#include "core/judge/session.hpp"
+#include "tests/support/curved_scenes.hpp"
+#include "tests/support/world_of.hpp"
 
 namespace kbvh::test::world_events_test {
 namespace {
@@ -124,6 +127,64 @@ TEST(WorldEvents, PositionsAtAnotherTimeAreThoseOfThatFrame) {
   handed_in.add_body("other", {std::vector<std::uint32_t>{0, 1, 2}}, std::vector<double>(9));
   handed_in.start("bottom_up");
   EXPECT_THROW(handed_in.positions(0, 0.5, found), std::logic_error);
+}
+
+/// Bodies on curves: positions are those of the flight plans, and pairs those of a session.
+template <class S>
+void expect_curves_to_be_played(const std::string& name) {
+  const Scene<S> scene = curved_scene<S>(name).scene;
+  const std::vector<double> frames = frame_times(scene, 4);
+  for (const char* const id : {"bottom_up", "kinetic_aabb", "kinetic_separation_list"}) {
+    const StrategyEntry& entry = find_strategy(id);
+    Session<S> session(scene, {&entry, {}, entry.info.topology.preferred});
+    World world = world_of(scene);
+    world.start(id, {}, frames[0]);
+    session.reset(frames[0]);
+    PairBuffer expected;
+    PhaseTimes times;
+    std::vector<WorldPair> pairs;
+    std::vector<double> positions;
+    for (const double t : frames) {
+      session.advance(t, times);
+      world.advance(t);
+      session.query(expected, times);
+      world.pairs(pairs);
+      EXPECT_EQ(pairs.size(), expected.size()) << id << " on " << name << ", t = " << t;
+      for (std::uint32_t body = 0; body < scene.bodies.size(); ++body) {
+        std::vector<S> of_plans(std::size_t(3) * scene.bodies[body].plans.vertex_count());
+        scene.bodies[body].plans.evaluate(t, of_plans.data());
+        world.positions(body, positions);
+        EXPECT_TRUE(std::equal(of_plans.begin(), of_plans.end(), positions.begin(), positions.end()))
+            << id << " on " << name << ", t = " << t;
+      }
+    }
+  }
+}
+
+TEST(WorldEvents, VerticesMayMoveOnCurves) {
+  for (const char* const name : {"curved_gravity", "curved_mixed"}) {
+    expect_curves_to_be_played<float>(name);
+    expect_curves_to_be_played<double>(name);
+  }
+  World world(Precision::float64);
+  const std::vector<std::uint32_t> triangle{0, 1, 2};
+  const std::vector<double> rest(9), moving(18), times{0, 1}, bends(9, 1), too_many(18, 1);
+  const auto add = [&](const WorldCurves& curves) {
+    return world.add_body("arc", {triangle}, times, std::span<const double>(moving), curves);
+  };
+  EXPECT_THROW(add({too_many, {}}), std::invalid_argument);
+  EXPECT_THROW(add({{}, std::span(bends).first(8)}), std::invalid_argument);
+  EXPECT_THROW(
+      world.add_body("still", {triangle}, std::vector<double>{0}, std::span<const double>(rest), {bends, {}}),
+      std::invalid_argument);
+  EXPECT_EQ(add({bends, {}}), 0u);
+  world.add_body("still", {triangle}, std::vector<double>{0}, std::span<const double>(rest));
+  EXPECT_THROW(world.start("auto"), ConfigError);  // foresees lines only
+  world.start("bottom_up");
+  world.advance(0.5);
+  std::vector<double> positions;
+  world.positions(0, positions);
+  EXPECT_EQ(positions, std::vector<double>(9, 0.25));
 }
 
 TEST(WorldEvents, QuestionsDoNotCount) {

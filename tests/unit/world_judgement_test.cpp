@@ -116,6 +116,7 @@ TEST(World, DescribesStrategiesInTheWordsOfResults) {
     const auto& words = list[i].abilities;
     EXPECT_EQ(std::find(words.begin(), words.end(), "spans") != words.end(), info.can.spans) << info.id;
     EXPECT_EQ(std::find(words.begin(), words.end(), "changes") != words.end(), info.can.changes) << info.id;
+    EXPECT_EQ(std::find(words.begin(), words.end(), "curves") != words.end(), info.can.curves) << info.id;
     EXPECT_EQ(list[i].method.empty(), info.topology.own) << info.id;
     EXPECT_EQ(list[i].primitives.size(), info.primitives.size()) << info.id;
     ASSERT_EQ(list[i].parameters.size(), info.parameters.size());

@@ -18,8 +18,24 @@ const char* word(io::MeshKind kind) {
                                         : "control_nets";
 }
 
-/// Hands the arrays of a mesh to numpy, without a copy. A body over the vertices of another one has the
-/// number of that body in place of positions.
+/// Returns one coefficient of the curves of all segments, [segment][vertex][3]; None where all are zero.
+py::object coefficients_of(const io::AnimatedMesh& mesh, std::vector<double> io::AnimatedMesh::Bends::*list) {
+  const std::size_t scalars = std::size_t(3) * mesh.vertex_count;
+  std::vector<double> all;
+  bool any = false;
+  for (const io::AnimatedMesh::Bends& segment : mesh.bends) {
+    const std::vector<double>& values = segment.*list;
+    any = any || !values.empty();
+    all.insert(all.end(), values.begin(), values.end());
+    all.insert(all.end(), values.empty() ? scalars : 0, 0.0);
+  }
+  if (!any) return py::none();
+  return numbers_of(std::move(all),
+                    {py::ssize_t(mesh.bends.size()), py::ssize_t(mesh.vertex_count), py::ssize_t(3)});
+}
+
+/// Hands the arrays of a mesh to numpy, without a copy but for its curves. A body over the vertices of
+/// another one has the number of that body in place of positions.
 py::dict body_of(LoadedScene& loaded, std::uint32_t body) {
   py::dict out;
   io::AnimatedMesh& mesh = loaded.meshes[body];
@@ -36,6 +52,8 @@ py::dict body_of(LoadedScene& loaded, std::uint32_t body) {
     out["over"] = loaded.vertices_of[body];
     return out;
   }
+  out["bends"] = coefficients_of(mesh, &io::AnimatedMesh::Bends::bend);
+  out["twists"] = coefficients_of(mesh, &io::AnimatedMesh::Bends::twist);
   out["times"] = numbers_of(std::move(mesh.keyframe_times), {keyframes});
   out["positions"] = numbers_of(std::move(mesh.positions), {keyframes, vertices, 3});
   return out;

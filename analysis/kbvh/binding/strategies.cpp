@@ -126,6 +126,8 @@ void register_strategy(const py::dict& given, const std::string& about, const py
                                      what + "ability");
     info.can.*ability = true;
   }
+  // Like make_entry for strategies in C++: without foresight of lines, no strategy expects them.
+  info.can.curves = info.foresight <= Foresight::step_bound;
   info.has_float = info.has_double = true;
   const std::string id = info.id;
   const std::size_t slot = slot_for(id);

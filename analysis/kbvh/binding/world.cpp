@@ -85,16 +85,24 @@ class PythonWorld {
       : precision_(precision), world_(precision_of(precision)) {}
 
   std::uint32_t add_body(const std::string& name, const py::object& indices, const py::object& offsets,
-                         const std::string& shape, const py::object& times, const py::object& positions) {
+                         const std::string& shape, const py::object& times, const py::object& positions,
+                         const py::object& bends, const py::object& twists) {
+    check_idle();
     const std::string what = "body '" + name + "'";
     const GivenPrimitives primitives(what, indices, offsets, shape);
     const Numbers numbers(positions, what + ", its positions");
     numbers.check_points(what + ", its positions");
     const Connectivity connectivity = primitives.connectivity();
+    std::vector<double> of_bends, of_twists;
+    if (!bends.is_none()) of_bends = doubles_of(bends, what + ", its bends");
+    if (!twists.is_none()) of_twists = doubles_of(twists, what + ", its twists");
+    if (times.is_none() && !(of_bends.empty() && of_twists.empty()))
+      throw std::invalid_argument(what + " has curves, but no keyframes");
     const auto add = [&](auto span) {
       if (times.is_none()) return world_.add_body(name, connectivity, span);
       const std::vector<double> keyframes = doubles_of(times, what + ", its times");
-      return world_.add_body(name, connectivity, std::span<const double>(keyframes), span);
+      return world_.add_body(name, connectivity, std::span<const double>(keyframes), span,
+                             {of_bends, of_twists});
     };
     const std::uint32_t body = numbers.single() ? add(numbers.floats()) : add(numbers.doubles());
     given_.emplace_back();
@@ -102,13 +110,18 @@ class PythonWorld {
   }
   std::uint32_t add_body_over(Whole over, const std::string& name, const py::object& indices,
                               const py::object& offsets, const std::string& shape) {
+    check_idle();
     const GivenPrimitives primitives("body '" + name + "'", indices, offsets, shape);
     const std::uint32_t body = world_.add_body_over(over, name, primitives.connectivity());
     given_.emplace_back();
     return body;
   }
-  void add_pair(Whole a, Whole b) { world_.add_pair(a, b); }
+  void add_pair(Whole a, Whole b) {
+    check_idle();
+    world_.add_pair(a, b);
+  }
   void set_radius(Real radius) {
+    check_idle();
     world_.set_radius(radius);
     has_radius_ = true;
   }
@@ -156,6 +169,8 @@ class PythonWorld {
 
   /// Returns whether the array is used where it lies: one of 3n + 1 numbers in the world's precision.
   bool set_positions(Whole body, const py::object& positions, const py::object& moved) {
+    // A world on its way to another time would keep other arrays alive than it reads.
+    check_idle();
     const std::string what = "the positions of body " + std::to_string(body);
     const Numbers numbers(positions, what);
     if (numbers.array().ndim() > 1) numbers.check_points(what);
@@ -354,10 +369,13 @@ class PythonWorld {
     return !has_radius_ && numbers.size() % 3 == 1 && numbers.single() == (precision_ == "float32");
   }
 
-  template <class Work>
-  auto alone(Work&& work) -> decltype(work()) {
+  void check_idle() const {
     if (busy_)
       throw std::logic_error("this world is at work, in another thread or in a strategy that asks it");
+  }
+  template <class Work>
+  auto alone(Work&& work) -> decltype(work()) {
+    check_idle();
     busy_ = true;
     struct Done {
       bool& busy;
@@ -438,7 +456,7 @@ void bind_world(py::module_& module) {
       .def_property_readonly("precision", method(&PythonWorld::precision))
       .def_property_readonly("time", method(&PythonWorld::time))
       .def("add_body", method(&PythonWorld::add_body), arg("name"), arg("indices"), arg("offsets"),
-           arg("shape"), arg("times"), arg("positions"))
+           arg("shape"), arg("times"), arg("positions"), arg("bends"), arg("twists"))
       .def("add_body_over", method(&PythonWorld::add_body_over), arg("body"), arg("name"), arg("indices"),
            arg("offsets"), arg("shape"))
       .def("set_radius", method(&PythonWorld::set_radius), arg("radius"))
