@@ -37,16 +37,6 @@ std::vector<std::size_t> vertices_below(const Tree& tree) {
   return counts;
 }
 
-std::uint64_t order_of(const Scene<float>& scene) {
-  std::uint64_t order = 1;
-  for (const Body<float>& body : scene.bodies)
-    for (std::size_t k = 0; k + 1 < body.plans.keyframe_count(); ++k) {
-      if (!body.plans.curved_in(k)) continue;
-      order = std::max<std::uint64_t>(order, body.plans.twists(k) != nullptr ? 3 : 2);
-    }
-  return order;
-}
-
 /// The changes of one bound in the segment that it is in.
 struct Bound {
   double segment = 0;
@@ -54,6 +44,15 @@ struct Bound {
 };
 
 }  // namespace
+
+std::uint64_t degree_of(const Scene<float>& scene) {
+  std::uint64_t degree = 1;
+  for (const Body<float>& body : scene.bodies)
+    for (std::size_t k = 0; k + 1 < body.plans.keyframe_count(); ++k)
+      if (body.plans.curved_in(k))
+        degree = std::max<std::uint64_t>(degree, body.plans.twists(k) != nullptr ? 3 : 2);
+  return degree;
+}
 
 double most_pieces(std::uint64_t order, std::uint64_t n) {
   if (order <= 1) return double(n);
@@ -64,7 +63,7 @@ double most_pieces(std::uint64_t order, std::uint64_t n) {
 }
 
 CurveRun measure_curves(const Scene<float>& scene) {
-  CurveRun run{.scene = scene.name, .order = order_of(scene)};
+  CurveRun run{.scene = scene.name, .order = degree_of(scene)};
   const SceneView<float> view(scene);
   Playback<float> playback(scene);
   Counters count;

@@ -112,9 +112,7 @@ std::uint64_t momentary(const Case& one, std::size_t bounds) {
 }  // namespace
 
 ExactRun measure_exact(const Scene<float>& scene, std::uint32_t instants) {
-  ExactRun run;
-  run.scene = scene.name;
-  run.triangles = scene.primitive_count();
+  ExactRun run{.scene = scene.name, .triangles = scene.primitive_count()};
   run.vertices = scene.vertex_count();
   const std::vector<double> keyframes = overlaid_keyframes(scene);
   run.keyframes = keyframes.size();
@@ -181,9 +179,7 @@ struct SameNodes {
 
 PlanRun measure_plan_changes(const Scene<float>& scene, const PlanScript<float>& script,
                              std::uint32_t frames_per_keyframe) {
-  PlanRun run;
-  run.scene = scene.name;
-  run.triangles = scene.primitive_count();
+  PlanRun run{.scene = scene.name, .triangles = scene.primitive_count()};
   const std::vector<double> keyframes = overlaid_keyframes(scene);
   Play play{paper_builder, frames_per_keyframe};
   const SceneView<float> view(scene);
