@@ -21,6 +21,7 @@
 #include "core/families/drift/drift_model.hpp"
 #include "core/families/drift/drift_probes.hpp"
 #include "core/families/drift/near_pairs.hpp"
+#include "core/families/wide/count_boxes.hpp"
 #include "core/families/wide/kernels/bounds.hpp"
 #include "core/families/wide/near_bodies.hpp"
 #include "core/geometry/predicates.hpp"
@@ -380,10 +381,7 @@ class DriftStrategy : public CountedStrategy<S>,
     body.remade = true;
     body.box = body.box_then = to_double(hierarchy.box(0));
     body.stand();
-    const std::uint32_t nodes = hierarchy.topology().size();
-    this->count_.add(Counter::nodes_visited, nodes);
-    this->count_.add(Counter::values_written, std::uint64_t(6) * nodes);
-    this->count_.add(Counter::vertex_reads, hierarchy.leaf_vertex_count());
+    count_boxes(this->count_, hierarchy.topology().size(), hierarchy.leaf_vertex_count());
   }
   void remember(std::uint32_t index) {
     if (bounded || !may_move(index)) return;

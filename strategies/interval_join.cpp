@@ -30,6 +30,7 @@
 #include "core/families/linear/linear_bounds.hpp"
 #include "core/families/linear/linear_probes.hpp"
 #include "core/families/linear/triangle_span_filter.hpp"
+#include "core/families/wide/count_boxes.hpp"
 #include "core/families/wide/swept_hierarchies.hpp"
 
 namespace kbvh {
@@ -326,10 +327,8 @@ class IntervalJoinStrategy final : public CountedStrategy<S>,
     swept_->pairs(query_, out, tests);
     this->count_.add(Counter::box_tests, tests);
     for (std::uint32_t body = 0; body < bounds_.body_count(); ++body) {
-      const std::uint64_t nodes = bounds_.hierarchy(body).topology().size();
-      this->count_.add(Counter::nodes_visited, nodes);
-      this->count_.add(Counter::values_written, 6 * nodes);
-      this->count_.add(Counter::vertex_reads, 2 * bounds_.hierarchy(body).leaf_vertex_count());
+      const WideHierarchy<S>& hierarchy = bounds_.hierarchy(body);
+      count_boxes(this->count_, hierarchy.topology().size(), 2 * hierarchy.leaf_vertex_count());
     }
   }
 
