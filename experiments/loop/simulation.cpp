@@ -18,7 +18,6 @@
 #include "experiments/loop/frames.hpp"
 #include "experiments/loop/penetration.hpp"
 #include "experiments/loop/recording.hpp"
-#include "experiments/loop/saved_state.hpp"
 
 namespace kbvh::experiments::loop {
 
@@ -214,10 +213,10 @@ std::uint64_t hash_of_state(const State& state) {
 SimulationResult simulate(const SimulationOptions& options, const std::function<void(const json&)>& done) {
   const Simulated scene = make_scene(options.scene, options.triangles, options.seed);
   if (options.save_every == 0) throw std::invalid_argument("a state is saved every 0 steps");
-  SavedState saved;
+  SimulationResult result;
+  SavedState& saved = result;
   saved.state = first_state(scene.mesh);
   SimulationFiles files(options, scene, saved);
-  SimulationResult result;
   result.first_step = saved.state.step;
   const ContactMesh contact_mesh(scene.mesh);
   const double radius = scene.physics.radius();
@@ -259,11 +258,6 @@ SimulationResult simulate(const SimulationOptions& options, const std::function<
     if (saved.state.step % options.save_every == 0 || saved.state.step == options.steps) files.save(saved);
     if (done) done(record);
   }
-  result.state = saved.state;
-  result.penetrations = saved.penetrations;
-  result.first_penetration = saved.first_penetration;
-  result.stalled = saved.stalled;
-  result.unconverged = saved.unconverged;
   return result;
 }
 
