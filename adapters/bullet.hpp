@@ -7,14 +7,18 @@
 // to unsigned. bullet_dbvt: everything admissible. Products of extents decide how its tree is built, at a
 // moderate scale; its queries, refits and insertions only add and compare. bullet_cones: everything
 // admissible. Its tree is made without coordinates, and normals are computed in double.
+#include <BulletCollision/BroadphaseCollision/btDbvt.h>
 #include <LinearMath/btVector3.h>
 
 #include <algorithm>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/contract/registry.hpp"
 #include "core/families/wide/near_bodies.hpp"
+#include "core/geometry/lane_box.hpp"
+#include "core/scene/self_pairs.hpp"
 #include "instructions.hpp"
 
 #ifdef BT_USE_DOUBLE_PRECISION
@@ -54,6 +58,55 @@ AuditView breadth_first(Handle root, const Primitive& primitive, const Children&
   return view;
 }
 
+/// Returns the primitive of a leaf of either kind of dynamic tree.
+inline std::uint32_t primitive_of(const btDbvtNode& leaf) {
+  return std::uint32_t(leaf.dataAsInt);
+}
+inline std::uint32_t primitive_of(const btDbvntNode& leaf) {
+  return std::uint32_t(reinterpret_cast<std::uintptr_t>(leaf.data));
+}
+
+template <class Node>
+Box<double> box_of(const Node& node) {
+  Box<double> box;
+  for (int axis = 0; axis < 3; ++axis) {
+    box.lower[axis] = double(node.volume.Mins()[axis]);
+    box.upper[axis] = double(node.volume.Maxs()[axis]);
+  }
+  return box;
+}
+
+/// Shows the audit a dynamic tree.
+template <class Node>
+AuditView view_of(const Node* root) {
+  return breadth_first(
+      root, [](const Node* node) { return node->isleaf() ? int(primitive_of(*node)) : -1; },
+      [](const Node* node) { return std::pair<const Node*, const Node*>(node->childs[0], node->childs[1]); },
+      [](const Node* node) { return box_of(*node); });
+}
+
+/// Collects overlapping leaves of two dynamic trees, or of one with itself.
+class LeafHits final : public btDbvt::ICollide {
+ public:
+  BodyPair bodies{};
+  const Primitives* within = nullptr;  ///< the primitives of the body, if it is one with itself
+  PairBuffer* out = nullptr;
+
+  using btDbvt::ICollide::Process;
+  void Process(const btDbvtNode* a, const btDbvtNode* b) override {
+    take(primitive_of(*a), primitive_of(*b));
+  }
+  void Process(const btDbvntNode* a, const btDbvntNode* b) override {
+    take(primitive_of(*a), primitive_of(*b));
+  }
+
+ private:
+  void take(std::uint32_t a, std::uint32_t b) {
+    if (within == nullptr || keep_self_pair(within, LeavesOf::two, a, b))
+      out->push_back({bodies.first, a, bodies.second, b});
+  }
+};
+
 /// The shared part: which bodies move, and the check that time does not run backwards.
 class Contestant : public CountedStrategy<float>, public TakesPlanChanges<float> {
  public:
@@ -81,6 +134,11 @@ class Contestant : public CountedStrategy<float>, public TakesPlanChanges<float>
  protected:
   virtual void update_all() = 0;
   virtual void update_moving() = 0;
+  btDbvtVolume volume(std::uint32_t body, std::uint32_t primitive) const {
+    const Box<float> box =
+        primitive_box(this->scene_.primitives(body)[primitive], this->sampled_.positions(body));
+    return btDbvtVolume::FromMM(vector(box.lower), vector(box.upper));
+  }
   void count_refit(std::uint64_t primitives) {
     this->count_.add(Counter::nodes_visited, 2 * primitives - 1);
     this->count_.add(Counter::values_written, 6 * (2 * primitives - 1));

@@ -18,8 +18,6 @@
 //   0.0003 for one without a normal.
 #include "bullet.hpp"
 
-#include <BulletCollision/BroadphaseCollision/btDbvt.h>
-
 #include <array>
 #include <cmath>
 #include <memory>
@@ -28,8 +26,6 @@
 #include <utility>
 
 #include "core/base/heap_block.hpp"
-#include "core/geometry/lane_box.hpp"
-#include "core/scene/self_pairs.hpp"
 
 namespace kbvh::bullet {
 namespace {
@@ -143,12 +139,6 @@ void take_primitive(btDbvtNode& leaf, std::uint32_t primitive) {
 void take_primitive(btDbvntNode& leaf, std::uint32_t primitive) {
   leaf.data = reinterpret_cast<void*>(std::uintptr_t(primitive));
 }
-std::uint32_t primitive_of(const btDbvtNode& leaf) {
-  return std::uint32_t(leaf.dataAsInt);
-}
-std::uint32_t primitive_of(const btDbvntNode& leaf) {
-  return std::uint32_t(reinterpret_cast<std::uintptr_t>(leaf.data));
-}
 void set_parent(btDbvtNode& node, btDbvtNode* parent) {
   node.parent = parent;
 }
@@ -188,23 +178,6 @@ btVector3 normal_of(std::span<const std::uint32_t> corners, const float* positio
   return btVector3(float(sum[0] / length), float(sum[1] / length), float(sum[2] / length));
 }
 
-/// Collects pairs of leaves, of two bodies or within one.
-class Hits final : public btDbvt::ICollide {
- public:
-  BodyPair bodies{};
-  const Primitives* primitives = nullptr;  ///< of the body, for pairs within it
-  PairBuffer* out = nullptr;
-
-  using btDbvt::ICollide::Process;
-  void Process(const btDbvtNode* a, const btDbvtNode* b) override {
-    out->push_back({bodies.first, primitive_of(*a), bodies.second, primitive_of(*b)});
-  }
-  void Process(const btDbvntNode* a, const btDbvntNode* b) override {
-    PrimitivePair pair{bodies.first, primitive_of(*a), bodies.second, primitive_of(*b)};
-    if (keep_self_pair(primitives, LeavesOf::two, pair.primitive_a, pair.primitive_b)) out->push_back(pair);
-  }
-};
-
 template <class S>
 class BulletCones final : public Contestant, public AnswersSelfPairs {
   static_assert(std::is_same_v<S, float>);
@@ -228,15 +201,15 @@ class BulletCones final : public Contestant, public AnswersSelfPairs {
     std::uint64_t tests = 0;
     const auto box_of_body = [&](std::uint32_t body) {
       const BodyState& state = bodies_[body];
-      return state.tree.m_root != nullptr ? box_of(state.tree.m_root)
-             : state.cones != nullptr     ? box_of(state.cones.get())
+      return state.tree.m_root != nullptr ? box_of(*state.tree.m_root)
+             : state.cones != nullptr     ? box_of(*state.cones)
                                           : Box<double>{};
     };
     for (const std::uint32_t i : this->near_bodies_.find(box_of_body, tests)) {
       const BodyPair& pair = this->scene_.pairs()[i];
       BodyState& first = bodies_[pair.first];
       hits_.bodies = pair;
-      hits_.primitives = &this->scene_.primitives(pair.first);
+      hits_.within = pair.first == pair.second ? &this->scene_.primitives(pair.first) : nullptr;
       if (pair.first == pair.second)
         first.tree.selfCollideT(first.cones.get(), hits_);
       else  // like collideTT, with a stack that stays allocated
@@ -289,31 +262,6 @@ class BulletCones final : public Contestant, public AnswersSelfPairs {
     if (with_itself) state.cones.reset(plant<btDbvntNode>(leaves, inner, root, nullptr, state.cone_nodes));
   }
 
-  template <class Node>
-  static Box<double> box_of(const Node* node) {
-    Box<double> box;
-    for (int axis = 0; axis < 3; ++axis) {
-      box.lower[axis] = double(node->volume.Mins()[axis]);
-      box.upper[axis] = double(node->volume.Maxs()[axis]);
-    }
-    return box;
-  }
-  template <class Node>
-  static AuditView view_of(const Node* root) {
-    return breadth_first(
-        root, [](const Node* node) { return node->isleaf() ? int(primitive_of(*node)) : -1; },
-        [](const Node* node) {
-          return std::pair<const Node*, const Node*>(node->childs[0], node->childs[1]);
-        },
-        [](const Node* node) { return box_of(node); });
-  }
-
-  btDbvtVolume volume(std::uint32_t body, std::uint32_t primitive) const {
-    const Box<float> box =
-        primitive_box(this->scene_.primitives(body)[primitive], this->sampled_.positions(body));
-    return btDbvtVolume::FromMM(vector(box.lower), vector(box.upper));
-  }
-
   void update(std::uint32_t body) {
     BodyState& state = bodies_[body];
     for (btDbvtNode* const node : state.nodes)
@@ -348,7 +296,7 @@ class BulletCones final : public Contestant, public AnswersSelfPairs {
   }
 
   std::vector<BodyState> bodies_;
-  Hits hits_;
+  LeafHits hits_;
 };
 
 }  // namespace

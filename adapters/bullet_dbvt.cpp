@@ -9,32 +9,13 @@
 // - Insertions build the first tree. They make a list of identical boxes, which optimizeTopDown() divides.
 #include "bullet.hpp"
 
-#include <BulletCollision/BroadphaseCollision/btDbvt.h>
-
 #include <cmath>
 #include <type_traits>
 
 #include "core/base/heap_block.hpp"
-#include "core/geometry/lane_box.hpp"
-#include "core/scene/self_pairs.hpp"
 
 namespace kbvh::bullet {
 namespace {
-
-/// Collects overlapping leaves of two dynamic trees, or of one with itself.
-class LeafHits final : public btDbvt::ICollide {
- public:
-  BodyPair bodies{};
-  const Primitives* within = nullptr;  ///< the primitives of the body, if it is one with itself
-  PairBuffer* out = nullptr;
-
-  using btDbvt::ICollide::Process;
-  void Process(const btDbvtNode* a, const btDbvtNode* b) override {
-    PrimitivePair pair{bodies.first, std::uint32_t(a->dataAsInt), bodies.second, std::uint32_t(b->dataAsInt)};
-    if (within == nullptr || keep_self_pair(within, LeavesOf::two, pair.primitive_a, pair.primitive_b))
-      out->push_back(pair);
-  }
-};
 
 template <class S>
 class BulletDbvt final : public Contestant, public AnswersSelfPairs {
@@ -54,16 +35,11 @@ class BulletDbvt final : public Contestant, public AnswersSelfPairs {
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& /*none*/) override {
     hits_.out = &out;
     std::uint64_t tests = 0;
-    const auto box_of = [&](std::uint32_t body) {
-      Box<double> box;
+    const auto box_of_body = [&](std::uint32_t body) {
       const btDbvtNode* root = bodies_[body].tree.m_root;
-      for (int axis = 0; axis < 3 && root != nullptr; ++axis) {
-        box.lower[axis] = double(root->volume.Mins()[axis]);
-        box.upper[axis] = double(root->volume.Maxs()[axis]);
-      }
-      return box;
+      return root != nullptr ? box_of(*root) : Box<double>{};
     };
-    for (const std::uint32_t i : this->near_bodies_.find(box_of, tests)) {
+    for (const std::uint32_t i : this->near_bodies_.find(box_of_body, tests)) {
       const BodyPair& pair = this->scene_.pairs()[i];
       hits_.bodies = pair;
       hits_.within = pair.first == pair.second ? &this->scene_.primitives(pair.first) : nullptr;
@@ -77,20 +53,7 @@ class BulletDbvt final : public Contestant, public AnswersSelfPairs {
 
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
     const btDbvtNode* root = bodies_[body].tree.m_root;
-    if (root == nullptr) return AuditView{};
-    return breadth_first(
-        root, [](const btDbvtNode* node) { return node->isleaf() ? node->dataAsInt : -1; },
-        [](const btDbvtNode* node) {
-          return std::pair<const btDbvtNode*, const btDbvtNode*>(node->childs[0], node->childs[1]);
-        },
-        [](const btDbvtNode* node) {
-          Box<double> box;
-          for (int axis = 0; axis < 3; ++axis) {
-            box.lower[axis] = double(node->volume.Mins()[axis]);
-            box.upper[axis] = double(node->volume.Maxs()[axis]);
-          }
-          return box;
-        });
+    return root == nullptr ? AuditView{} : view_of(root);
   }
 
   std::size_t bytes() const override {
@@ -113,12 +76,6 @@ class BulletDbvt final : public Contestant, public AnswersSelfPairs {
     std::vector<btDbvtNode*> nodes;  // refit: all, children before parents; else leaves by primitive
   };
 
-  btDbvtVolume volume(std::uint32_t body, int primitive) const {
-    const Box<float> box = primitive_box(this->scene_.primitives(body)[std::uint32_t(primitive)],
-                                         this->sampled_.positions(body));
-    return btDbvtVolume::FromMM(vector(box.lower), vector(box.upper));
-  }
-
   void build(std::uint32_t body) {
     BodyState& state = bodies_[body];
     const std::uint32_t count = this->scene_.primitives(body).count();
@@ -126,10 +83,10 @@ class BulletDbvt final : public Contestant, public AnswersSelfPairs {
     // Insertion and optimizeTopDown() multiply extents: far from 1 they overflow, and optimizeTopDown() then
     // writes out of bounds. The shape of the tree is decided at a moderate scale; true volumes follow.
     const float scale = sane_scale(body);
-    for (int p = 0; p < int(count); ++p) {
+    for (std::uint32_t p = 0; p < count; ++p) {
       const btDbvtVolume real = volume(body, p);
       state.built.insert(btDbvtVolume::FromMM(real.Mins() * scale, real.Maxs() * scale), nullptr)->dataAsInt =
-          p;
+          int(p);
     }
     state.built.optimizeTopDown();
   }
@@ -180,7 +137,7 @@ class BulletDbvt final : public Contestant, public AnswersSelfPairs {
   float sane_scale(std::uint32_t body) const {
     float largest = 0;
     for (std::uint32_t p = 0; p < this->scene_.primitives(body).count(); ++p) {
-      const btDbvtVolume v = volume(body, int(p));
+      const btDbvtVolume v = volume(body, p);
       for (int axis = 0; axis < 3; ++axis)
         largest = std::max({largest, std::abs(v.Mins()[axis]), std::abs(v.Maxs()[axis])});
     }
@@ -190,7 +147,7 @@ class BulletDbvt final : public Contestant, public AnswersSelfPairs {
 
   void set_volume(std::uint32_t body, btDbvtNode& node) const {
     if (node.isleaf())
-      node.volume = volume(body, node.dataAsInt);
+      node.volume = volume(body, primitive_of(node));
     else
       Merge(node.childs[0]->volume, node.childs[1]->volume, node.volume);
   }
@@ -203,8 +160,8 @@ class BulletDbvt final : public Contestant, public AnswersSelfPairs {
       this->count_refit(this->scene_.primitives(body).count());
       return;
     }
-    for (std::size_t p = 0; p < state.nodes.size(); ++p) {
-      btDbvtVolume box = volume(body, int(p));
+    for (std::uint32_t p = 0; p < state.nodes.size(); ++p) {
+      btDbvtVolume box = volume(body, p);
       state.tree.update(state.nodes[p], box);
     }
     this->count_.add(Counter::vertex_reads, 3 * state.nodes.size());

@@ -26,7 +26,7 @@
 #include <vector>
 
 #include "core/contract/registry.hpp"
-#include "core/families/wide/near_bodies.hpp"
+#include "core/families/wide/body_by_body.hpp"
 #include "core/geometry/lane_box.hpp"
 #include "core/scene/self_pairs.hpp"
 #include "instructions.hpp"
@@ -53,28 +53,15 @@ struct CgalTraits {
 };
 
 template <class S>
-class CgalBoxes final : public CountedStrategy<S>, public AnswersSelfPairs, public TakesPlanChanges<S> {
+class CgalBoxes final : public BodyByBody<S>, public AnswersSelfPairs {
+  using BodyByBody<S>::near_bodies_;
+
  public:
-  static constexpr Foresight foresight = Foresight::none;
   CgalBoxes(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies /*none*/,
             const Params& params)
-      : CountedStrategy<S>(scene, motion),
+      : BodyByBody<S>(scene, motion),
         cutoff_(std::ptrdiff_t(params.number("cutoff"))),
-        bodies_(scene.body_count()),
-        near_bodies_(scene.pairs(), scene.body_count()) {}
-
-  void reset_to(double /*t*/) override {
-    near_bodies_.start_over();
-    plans_changed_ = false;
-    for (std::uint32_t body = 0; body < bodies_.size(); ++body) update(body);
-  }
-  void advance_to(double /*t*/) override {
-    for (std::uint32_t body = 0; body < bodies_.size(); ++body)
-      if (this->scene_.moving(body) || plans_changed_) update(body);
-  }
-  void follow_plans(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
-    plans_changed_ = true;
-  }
+        bodies_(scene.body_count()) {}
 
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& /*none*/) override {
     std::uint64_t tests = 0;
@@ -122,7 +109,7 @@ class CgalBoxes final : public CountedStrategy<S>, public AnswersSelfPairs, publ
         CgalTraits<S>(), cutoff_, CGAL::Box_intersection_d::CLOSED, setting);
   }
 
-  void update(std::uint32_t index) {
+  void update(std::uint32_t index) override {
     Body& body = bodies_[index];
     const Primitives& primitives = this->scene_.primitives(index);
     const S* const positions = this->sampled_.positions(index);
@@ -148,8 +135,6 @@ class CgalBoxes final : public CountedStrategy<S>, public AnswersSelfPairs, publ
   std::ptrdiff_t cutoff_;
   std::vector<Body> bodies_;
   std::vector<CgalBox<S>> copy_;
-  NearBodies near_bodies_;
-  bool plans_changed_ = false;
 };
 
 }  // namespace

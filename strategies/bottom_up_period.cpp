@@ -6,7 +6,8 @@
 
 #include "core/base/heap_block.hpp"
 #include "core/contract/registry.hpp"
-#include "core/families/wide/near_bodies.hpp"
+#include "core/families/wide/body_by_body.hpp"
+#include "core/families/wide/count_boxes.hpp"
 #include "core/topology/probe_traversal.hpp"
 
 namespace kbvh {
@@ -44,29 +45,16 @@ struct PeriodTree {
 };
 
 template <class S>
-class BottomUpPeriod final : public CountedStrategy<S>, public AnswersProbes<S>, public TakesPlanChanges<S> {
+class BottomUpPeriod final : public BodyByBody<S>, public AnswersProbes<S> {
+  using BodyByBody<S>::near_bodies_;
   using Node = PeriodNode<S>;
 
  public:
-  static constexpr Foresight foresight = Foresight::none;
   BottomUpPeriod(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
                  const Params& /*params*/)
-      : CountedStrategy<S>(scene, motion),
-        near_bodies_(scene.pairs(), scene.body_count()),
-        topologies_(std::move(topologies)) {
+      : BodyByBody<S>(scene, motion), topologies_(std::move(topologies)) {
     for (const Topology& topology : topologies_)
       roots_.push_back(topology.empty() ? nullptr : link(topology, 0));
-  }
-
-  void reset_to(double /*t*/) override {
-    plans_changed_ = false;
-    near_bodies_.start_over();
-    for (std::uint32_t body = 0; body < roots_.size(); ++body) update(body);
-  }
-
-  void advance_to(double /*t*/) override {
-    for (std::uint32_t body = 0; body < roots_.size(); ++body)
-      if (this->scene_.moving(body) || plans_changed_) update(body);
   }
 
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& /*budget*/) override {
@@ -95,10 +83,6 @@ class BottomUpPeriod final : public CountedStrategy<S>, public AnswersProbes<S>,
                               this->sampled_.positions(body), probe_stack_, tests, this->triangle_stats_);
         });
     this->count_.add(Counter::box_tests, all);
-  }
-
-  void follow_plans(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
-    plans_changed_ = true;
   }
 
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
@@ -137,13 +121,11 @@ class BottomUpPeriod final : public CountedStrategy<S>, public AnswersProbes<S>,
     return {nodes_.data() + begin, topologies_[body].size()};
   }
 
-  void update(std::uint32_t body) {
+  void update(std::uint32_t body) override {
     if (roots_[body] == nullptr) return;
     const Primitives& primitives = this->scene_.primitives(body);
     refit(*roots_[body], primitives, this->sampled_.positions(body));
-    this->count_.add(Counter::nodes_visited, topologies_[body].size());
-    this->count_.add(Counter::values_written, std::uint64_t(6) * topologies_[body].size());
-    this->count_.add(Counter::vertex_reads, primitives.vertices.size());
+    count_boxes(this->count_, topologies_[body].size(), primitives.vertices.size());
   }
 
   void refit(Node& node, const Primitives& primitives, const S* positions) {
@@ -180,13 +162,11 @@ class BottomUpPeriod final : public CountedStrategy<S>, public AnswersProbes<S>,
     }
   }
 
-  NearBodies near_bodies_;
   Topologies topologies_;
   std::vector<std::unique_ptr<Node>> nodes_;
   std::vector<Node*> roots_;
   std::vector<ProbeNode<const Node*>> probe_stack_;
   BodyOrder probe_order_;
-  bool plans_changed_ = false;
 };
 
 }  // namespace

@@ -4,7 +4,8 @@
 // (`bottom_up_period` also links its nodes by pointers).
 
 #include "core/contract/registry.hpp"
-#include "core/families/wide/near_bodies.hpp"
+#include "core/families/wide/body_by_body.hpp"
+#include "core/families/wide/count_boxes.hpp"
 #include "core/topology/probe_traversal.hpp"
 
 namespace kbvh {
@@ -26,32 +27,19 @@ struct RecursiveBody {
 
 /// Both recursions are as deep as the topologies: log2 n for the median.
 template <class S>
-class BottomUpRecursive final : public CountedStrategy<S>,
-                                public AnswersProbes<S>,
-                                public TakesPlanChanges<S> {
+class BottomUpRecursive final : public BodyByBody<S>, public AnswersProbes<S> {
+  using BodyByBody<S>::near_bodies_;
   using Body = RecursiveBody<S>;
 
  public:
-  static constexpr Foresight foresight = Foresight::none;
   BottomUpRecursive(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
                     const Params& /*params*/)
-      : CountedStrategy<S>(scene, motion), near_bodies_(scene.pairs(), scene.body_count()) {
+      : BodyByBody<S>(scene, motion) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body) {
       const std::uint32_t nodes = topologies[body].size();
       bodies_.push_back({std::move(topologies[body]), std::vector<Box<S>>(nodes), &scene.primitives(body),
                          motion.positions(body)});
     }
-  }
-
-  void reset_to(double /*t*/) override {
-    plans_changed_ = false;
-    near_bodies_.start_over();
-    for (std::uint32_t body = 0; body < bodies_.size(); ++body) update(body);
-  }
-
-  void advance_to(double /*t*/) override {
-    for (std::uint32_t body = 0; body < bodies_.size(); ++body)
-      if (this->scene_.moving(body) || plans_changed_) update(body);
   }
 
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& /*none*/) override {
@@ -85,10 +73,6 @@ class BottomUpRecursive final : public CountedStrategy<S>,
     this->count_.add(Counter::box_tests, all);
   }
 
-  void follow_plans(double /*t*/, std::span<const PlanChange<S>> /*changes*/) override {
-    plans_changed_ = true;
-  }
-
   std::optional<AuditView> audit_view(std::uint32_t body) const override {
     AuditView view{bodies_[body].topology, {}, {}};
     for (const Box<S>& box : bodies_[body].boxes) view.boxes.push_back(to_double(box));
@@ -103,14 +87,12 @@ class BottomUpRecursive final : public CountedStrategy<S>,
   }
 
  private:
-  void update(std::uint32_t body) {
+  void update(std::uint32_t body) override {
     bodies_[body].positions = this->sampled_.positions(body);
     const Body& updated = bodies_[body];
     if (updated.topology.empty()) return;
     refit(bodies_[body], 0);
-    this->count_.add(Counter::nodes_visited, updated.topology.size());
-    this->count_.add(Counter::values_written, std::uint64_t(6) * updated.topology.size());
-    this->count_.add(Counter::vertex_reads, updated.primitives->vertices.size());
+    count_boxes(this->count_, updated.topology.size(), updated.primitives->vertices.size());
   }
 
   void refit(Body& body, std::uint32_t id) {
@@ -167,11 +149,9 @@ class BottomUpRecursive final : public CountedStrategy<S>,
       }
   }
 
-  NearBodies near_bodies_;
   std::vector<Body> bodies_;
   std::vector<ProbeNode<std::uint32_t>> probe_stack_;
   BodyOrder probe_order_;
-  bool plans_changed_ = false;
 };
 
 }  // namespace

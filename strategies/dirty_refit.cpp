@@ -80,12 +80,12 @@ class DirtyRefit final : public StoredHierarchyStrategy<S>,
         .listed(hierarchy.width())(hierarchy.arrays(), this->sampled_.positions(body), nodes.data(),
                                    std::uint32_t(nodes.size()));
     std::uint64_t visited = 1;  // the root
+    std::uint64_t reads = 0;
     for (const std::uint32_t node : nodes) {
       visited += hierarchy.arrays().nodes[node].count;
-      this->count_.add(Counter::vertex_reads, hierarchy.leaf_vertices_of(node));
+      reads += hierarchy.leaf_vertices_of(node);
     }
-    this->count_.add(Counter::nodes_visited, visited);
-    this->count_.add(Counter::values_written, 6 * visited);
+    count_boxes(this->count_, visited, reads);
   }
   void counts_cleared() override { partial_refits_ = vertices_moved_ = 0; }
   void add_counts(Counters& table) const override {

@@ -6,6 +6,7 @@
 
 #include "core/contract/registry.hpp"
 #include "core/families/wide/kernels/bounds.hpp"
+#include "core/families/wide/lazy_query.hpp"
 #include "core/families/wide/stored_hierarchy.hpp"
 
 namespace kbvh {
@@ -69,22 +70,11 @@ class Hybrid final : public StoredHierarchyStrategy<S> {
   }
 
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& budget) override {
-    QueryStatus status;
     std::uint64_t tests = 0;
-    this->for_near_bodies(tests, [&](const BodyPair& pair) {
-      if (tests >= budget.box_tests) {
-        ++status.pending;
-        return;
-      }
-      const WideSide<S> a = lazy_side(pair.first), b = lazy_side(pair.second);
-      auto& query = this->query_;
-      query.start_lazy(a, b, rest_of(budget, tests));
-      while (const auto wanted = query.step(a, b, out, tests)) {
-        if (wanted.first != wanted.none) make_current(pair.first, wanted.first);
-        if (wanted.second != wanted.none) make_current(pair.second, wanted.second);
-      }
-      status.pending += query.lazy_status().pending;
-    });
+    const auto side_of = [&](std::uint32_t body) { return lazy_side(body); };
+    const auto make = [&](std::uint32_t body, std::uint32_t node) { make_current(body, node); };
+    const QueryStatus status = query_lazily(this->query_, this->near_bodies_, this->scene_.pairs(), budget,
+                                            side_of, make, out, tests);
     this->count_.add(Counter::box_tests, tests);
     return status;
   }
@@ -247,9 +237,7 @@ class Hybrid final : public StoredHierarchyStrategy<S> {
       for (const std::uint32_t root : body.roots) body.stale[root] = 1;
     else
       for (std::uint32_t n = 0; n < body.stale.size(); ++n) body.stale[n] = body.root_of[n] != none;
-    this->count_.add(Counter::nodes_visited, body.boxes_above + 1);
-    this->count_.add(Counter::values_written, 6 * (body.boxes_above + 1));
-    this->count_.add(Counter::vertex_reads, body.reads_above);
+    count_boxes(this->count_, body.boxes_above + 1, body.reads_above);
   }
 
   /// Computes the boxes of a node's children; with `Below::subtree`, of everything below them, too.
@@ -269,9 +257,7 @@ class Hybrid final : public StoredHierarchyStrategy<S> {
     }
     hierarchy.refit_nodes(positions, node, node + 1);
     body.stale[node] = 0;
-    this->count_.add(Counter::nodes_visited, boxes);
-    this->count_.add(Counter::values_written, 6 * boxes);
-    this->count_.add(Counter::vertex_reads, reads);
+    count_boxes(this->count_, boxes, reads);
   }
 
   Below below_;

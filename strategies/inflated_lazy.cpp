@@ -12,8 +12,8 @@
 #include <cmath>
 
 #include "core/base/cost_constants.hpp"
-#include "core/base/median.hpp"
 #include "core/contract/registry.hpp"
+#include "core/families/drift/drift_body.hpp"
 #include "core/families/wide/kernels/wide_inflate.hpp"
 #include "core/families/wide/stored_hierarchy.hpp"
 
@@ -206,15 +206,8 @@ class InflatedLazy final : public StoredHierarchyStrategy<S> {
   void measure_leaves(std::uint32_t index) {
     const auto& hierarchy = this->hierarchies_[index];
     std::vector<double> sides;
-    for (std::uint32_t node = 0; node < hierarchy.topology().size(); ++node) {
-      if (!hierarchy.topology().nodes[node].is_leaf()) continue;
-      const Box<S> box = hierarchy.box(node);
-      double side = 0;
-      for (int axis = 0; axis < 3; ++axis) side += (double(box.upper[axis]) - double(box.lower[axis])) / 3;
-      sides.push_back(side);
-    }
+    bodies_[index].leaf_size = usual_leaf_side(hierarchy, sides);
     bodies_[index].leaves = sides.size();
-    bodies_[index].leaf_size = median(sides);
     if (sides.empty()) return;
     const Box<S> root = hierarchy.box(0);
     bodies_[index].size = 0;

@@ -22,45 +22,18 @@
 #include <limits>
 
 #include "core/base/cost_constants.hpp"
-#include "core/base/pacer.hpp"
 #include "core/contract/registry.hpp"
 #include "core/contract/reports_work.hpp"
 #include "core/families/linear/interval_join.hpp"
 #include "core/families/linear/join_changes.hpp"
 #include "core/families/linear/linear_bounds.hpp"
 #include "core/families/linear/linear_probes.hpp"
-#include "core/families/linear/triangle_span_filter.hpp"
+#include "core/families/linear/segment_joins.hpp"
+#include "core/families/wide/count_boxes.hpp"
 #include "core/families/wide/swept_hierarchies.hpp"
 
 namespace kbvh {
 namespace {
-
-/// The joins of one segment, with the verdicts on their pairs of triangles: one join per pair of bodies, or,
-/// with many pairs, two joins for all of them, one with span tests and one without.
-template <class S>
-struct Joins {
-  std::vector<IntervalJoin<S>> joins;
-  std::vector<TriangleSpanFilter<S>> answers;
-
-  explicit Joins(std::size_t count) : joins(count), answers(count) {}
-  std::size_t bytes() const {
-    std::size_t total = 0;
-    for (const auto& join : joins) total += join.bytes();
-    for (const auto& one : answers) total += one.bytes();
-    return total;
-  }
-};
-
-/// The progress of the work on the next segment. All work is in units of the cost of a box test.
-struct WorkAhead {
-  enum class Stage : std::uint8_t { nothing, bounds, joins, answers, done };
-  Stage stage = Stage::nothing;
-  std::size_t join = 0;  ///< the next join
-  bool begun = false;    ///< work on that join has begun
-  bool joins_begun = false;
-  Pacer pacer;
-  double done = 0;
-};
 
 /// With foresight of the whole clip the next segment's answer is computed during the current one, a part at
 /// each frame; otherwise all of it at the first frame of the segment.
@@ -326,10 +299,8 @@ class IntervalJoinStrategy final : public CountedStrategy<S>,
     swept_->pairs(query_, out, tests);
     this->count_.add(Counter::box_tests, tests);
     for (std::uint32_t body = 0; body < bounds_.body_count(); ++body) {
-      const std::uint64_t nodes = bounds_.hierarchy(body).topology().size();
-      this->count_.add(Counter::nodes_visited, nodes);
-      this->count_.add(Counter::values_written, 6 * nodes);
-      this->count_.add(Counter::vertex_reads, 2 * bounds_.hierarchy(body).leaf_vertex_count());
+      const WideHierarchy<S>& hierarchy = bounds_.hierarchy(body);
+      count_boxes(this->count_, hierarchy.topology().size(), 2 * hierarchy.leaf_vertex_count());
     }
   }
 

@@ -11,6 +11,7 @@
 #include "core/families/envelope/curve_envelope.hpp"
 #include "core/families/envelope/realiser_strategy.hpp"
 #include "core/families/envelope/segment_envelope.hpp"
+#include "core/families/wide/count_boxes.hpp"
 
 namespace kbvh {
 namespace {
@@ -136,9 +137,7 @@ class Envelopes final : public RealiserStrategy<S>, public TakesPlanChanges<S> {
   void refit(std::uint32_t body) {
     Base::refit(body);
     const auto& hierarchy = this->hierarchy(body);
-    this->count_.add(Counter::nodes_visited, hierarchy.topology().size());
-    this->count_.add(Counter::values_written, std::uint64_t(6) * hierarchy.topology().size());
-    this->count_.add(Counter::vertex_reads, hierarchy.leaf_vertex_count());
+    count_boxes(this->count_, hierarchy.topology().size(), hierarchy.leaf_vertex_count());
   }
 
   /// Enters a new segment at the current time. Returns false if its whole envelope had to be computed now.

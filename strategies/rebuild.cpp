@@ -44,9 +44,8 @@ class Rebuild final : public StoredHierarchyStrategy<S>,
     hierarchy.assign(build_topology(primitives, this->sampled_.positions(body), config_), primitives,
                      hierarchy.kernels());
     this->refit(body);
-    this->count_.add(Counter::nodes_visited, hierarchy.topology().size());
-    this->count_.add(Counter::values_written, std::uint64_t(6) * hierarchy.topology().size());
-    this->count_.add(Counter::vertex_reads, primitives.vertices.size() + hierarchy.leaf_vertex_count());
+    count_boxes(this->count_, hierarchy.topology().size(),
+                primitives.vertices.size() + hierarchy.leaf_vertex_count());
   }
 
   BuilderConfig config_;

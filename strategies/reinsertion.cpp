@@ -14,6 +14,7 @@
 
 #include "core/contract/registry.hpp"
 #include "core/families/restructure/moving_tree.hpp"
+#include "core/families/wide/count_boxes.hpp"
 #include "core/families/wide/near_bodies.hpp"
 #include "core/families/wide/wide_probes.hpp"
 #include "core/families/wide/wide_query.hpp"
@@ -161,9 +162,7 @@ class Reinsertion final : public CountedStrategy<S>,
     tree.positions_changed();
     if (tree.empty()) return;
     tree.refit(this->sampled_.positions(index));
-    this->count_.add(Counter::nodes_visited, tree.node_count());
-    this->count_.add(Counter::values_written, std::uint64_t(6) * tree.node_count());
-    this->count_.add(Counter::vertex_reads, tree.leaf_vertex_count());
+    count_boxes(this->count_, tree.node_count(), tree.leaf_vertex_count());
   }
 
   void restructure(std::uint32_t index) {

@@ -81,9 +81,7 @@ class SpecialRegions final : public StoredHierarchyStrategy<S>, public AnswersSe
       body.region.take(hierarchy, body.moves);
     }
     body.region.refit(hierarchy, this->sampled_.positions(index));
-    this->count_.add(Counter::nodes_visited, body.region.boxes());
-    this->count_.add(Counter::values_written, 6 * body.region.boxes());
-    this->count_.add(Counter::vertex_reads, body.region.reads());
+    count_boxes(this->count_, body.region.boxes(), body.region.reads());
   }
 
   void enter_segment(std::uint32_t index) {

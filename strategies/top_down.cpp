@@ -58,9 +58,7 @@ class TopDown final : public StoredHierarchyStrategy<S>,
       }
       hierarchy.set_box(node, box);
     }
-    this->count_.add(Counter::nodes_visited, topology.size());
-    this->count_.add(Counter::values_written, std::uint64_t(6) * topology.size());
-    this->count_.add(Counter::vertex_reads, reads_[body]);
+    count_boxes(this->count_, topology.size(), reads_[body]);
   }
 
   static std::vector<Range> primitive_ranges(const Topology& topology) {

@@ -155,13 +155,9 @@ def _plain(rule: str) -> str:
     return re.sub(r"l = ([\d.]+)", r"\1 frames a keyframe", re.sub(r" \([^()]*\)", "", rule))
 
 
-def on_the_paper(found: Paper) -> str:
-    """Answers whether the paper holds: by this study where it decides, else by the reference run."""
-    return " ".join(parts_on_the_paper(found))
-
-
 def parts_on_the_paper(found: Paper) -> list[str]:
-    """Returns the answer on the paper's main claim, and the tally of all of them."""
+    """Answers whether the paper holds, by this study where it decides, else by the reference run: its main claim, and the tally
+    of all of them."""
     counts = {verdict: here + there for verdict, here, there in found.tally}
     decided = [one for one in found.verdicts if one.source]
     if not decided:

@@ -13,7 +13,6 @@ import numpy.typing as npt
 
 from . import _core
 
-SHAPES = ("polygons", "points", "control_nets")
 #: A path of a file.
 PathLike = Union[str, "os.PathLike[str]"]
 

@@ -7,7 +7,6 @@
 #include <optional>
 
 #include "core/continuous/impact_batch.hpp"
-#include "core/contract/registry.hpp"
 #include "experiments/cli/commands.hpp"
 #include "experiments/cli/options.hpp"
 #include "experiments/cli/program.hpp"
@@ -50,18 +49,6 @@ struct Row {
     return seconds > 0 ? double(queries) * double(passes) / seconds : 0;
   }
 };
-
-struct Peer {
-  std::string id;
-  bool (*touches)(Contact::Kind, const MovingPoints&);
-};
-
-std::vector<Peer> peers() {
-  std::vector<Peer> found;
-  for (const StrategyEntry& entry : registry())
-    if (entry.info.own_impact != nullptr) found.push_back({entry.info.id, entry.info.own_impact});
-  return found;
-}
 
 /// The exact test, on queries of one kind in batches.
 class ExactTest {
@@ -131,11 +118,12 @@ void time_passes(const ImpactQueries& queries, Row& row, double seconds, Test& t
 }
 
 /// Times the exact test and the peers alternately, each for `seconds` in total.
-std::vector<Row> measure(const ImpactQueries& queries, const std::vector<Peer>& others, double seconds) {
+std::vector<Row> measure(const ImpactQueries& queries, const std::vector<ImpactPeer>& others,
+                         double seconds) {
   std::vector<Row> rows(1 + others.size());
   ExactTest exact;
   std::vector<PeerTest> tests;
-  for (const Peer& other : others) tests.push_back({other.touches});
+  for (const ImpactPeer& other : others) tests.push_back({other.touches});
   judge(queries, rows[0], exact);
   rows[0].filtered = exact.stats().filtered;
   for (std::size_t i = 0; i < tests.size(); ++i) judge(queries, rows[1 + i], tests[i]);
@@ -214,10 +202,10 @@ int run(const Arguments& arguments) {
   const json options{{"paths", paths}, {"seconds", arguments.seconds}};
   std::optional<ResultFile> result;
   if (!arguments.out.empty()) result.emplace(arguments.out, "ccd.json", options);
-  const std::vector<Peer> others = peers();
+  const std::vector<ImpactPeer> others = impact_peers();
   std::vector<std::vector<std::string>> table{
       {"queries of", "queries", "touch", "missed", "extra", "filtered", "per second"}};
-  for (const Peer& peer : others)
+  for (const ImpactPeer& peer : others)
     for (const char* column : {" missed", " extra", " per second"}) table[0].push_back(peer.id + column);
   json records = json::array();
   std::uint64_t queries = 0, wrong = 0, unknown = 0;

@@ -75,34 +75,21 @@ json strategy_json(const Info& info) {
     topology = {{"widths", info.topology.widths},
                 {"min_leaf_size", info.topology.min_leaf_size},
                 {"max_leaf_size", info.topology.max_leaf_size},
-                {"preferred",
-                 {{"method", name(info.topology.preferred.method)},
-                  {"width", info.topology.preferred.width},
-                  {"leaf_size", info.topology.preferred.leaf_size}}}};
-  return {{"id", info.id},
-          {"title", info.title},
-          {"family", info.family},
-          {"baseline", info.baseline},
-          {"citation", info.citation},
-          {"about", about(info.id)},
-          {"foresight", word(info.foresight)},
-          {"tightness", word(info.tightness)},
-          {"guarantee", word(info.guarantee)},
-          {"rays_guarantee", word(info.rays_guarantee)},
-          {"positions", info.positions == PositionUse::all       ? "all"
-                        : info.positions == PositionUse::fetched ? "fetched"
-                                                                 : "varying"},
-          {"scalars", scalars_of(info)},
-          {"own_scalar", info.own_scalar},
-          {"version", info.version},
-          {"instructions", info.instructions},
-          {"remark", info.remark},
-          {"capabilities", capabilities_of(info)},
-          {"primitives", primitives_of(info)},
-          {"parameters", parameters},
-          {"topology", topology},
-          {"max_primitive_pairs", info.max_primitive_pairs},
-          {"max_coordinate", std::isfinite(info.max_coordinate) ? json(info.max_coordinate) : json(nullptr)}};
+                {"preferred", in_words(info.topology.preferred)}};
+  json strategy = about_strategy(info);
+  strategy.update(
+      {{"rays_guarantee", word(info.rays_guarantee)},
+       {"positions", info.positions == PositionUse::all       ? "all"
+                     : info.positions == PositionUse::fetched ? "fetched"
+                                                              : "varying"},
+       {"scalars", scalars_of(info)},
+       {"capabilities", capabilities_of(info)},
+       {"primitives", primitives_of(info)},
+       {"parameters", parameters},
+       {"topology", topology},
+       {"max_primitive_pairs", info.max_primitive_pairs},
+       {"max_coordinate", std::isfinite(info.max_coordinate) ? json(info.max_coordinate) : json(nullptr)}});
+  return strategy;
 }
 
 void print_json() {

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "core/kernels/kernel_set.hpp"
+#include "experiments/common/names.hpp"
 #include "experiments/common/text.hpp"
 #include "experiments/io/animated_mesh.hpp"
 
@@ -144,6 +145,11 @@ std::string program_identity() {
     return text + "+" + hexadecimal(hash_of_file(own_file()));
   }();
   return identity;
+}
+
+std::string host_name() {
+  char name[256] = {};
+  return ::gethostname(name, sizeof name - 1) == 0 ? file_name(name) : "unknown";
 }
 
 std::string now_utc() {

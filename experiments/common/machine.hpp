@@ -18,6 +18,9 @@ bool dirty();
 /// repository also a hash of the running executable, or of the module that holds this code.
 std::string program_identity();
 
+/// Returns the name of this machine as a part of a file name, or "unknown".
+std::string host_name();
+
 /// Returns the current time in UTC, as 2025-01-31T12:00:00Z.
 std::string now_utc();
 

@@ -10,7 +10,9 @@ namespace kbvh::experiments::loop {
 struct SavedState {
   std::uint64_t options = 0;                           ///< a hash of the options: others cannot continue it
   std::uint64_t lines_bytes = 0, recording_bytes = 0;  ///< of the other files when it was saved
-  std::uint64_t penetrations = 0, first_penetration = 0, stalled = 0, unconverged = 0;  ///< SimulationResult
+  std::uint64_t penetrations = 0;                      ///< intersecting pairs of triangles, summed over steps
+  std::uint64_t first_penetration = 0;  ///< the number of steps after which the first were counted; 0: none
+  std::uint64_t stalled = 0, unconverged = 0;  ///< steps with these endings
   State state;
 };
 

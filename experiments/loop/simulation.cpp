@@ -18,7 +18,6 @@
 #include "experiments/loop/frames.hpp"
 #include "experiments/loop/penetration.hpp"
 #include "experiments/loop/recording.hpp"
-#include "experiments/loop/saved_state.hpp"
 
 namespace kbvh::experiments::loop {
 
@@ -227,10 +226,10 @@ SimulationResult simulate(const SimulationOptions& options, const std::function<
   if (options.save_every == 0) throw std::invalid_argument("a state is saved every 0 steps");
   const ContactMesh contact_mesh(scene.mesh);
   if (!options.strategy.id.empty()) check_contact_strategy(options.strategy, contact_mesh);
-  SavedState saved;
+  SimulationResult result;
+  SavedState& saved = result;
   saved.state = first_state(scene.mesh);
   SimulationFiles files(options, scene, saved);
-  SimulationResult result;
   result.first_step = saved.state.step;
   const double radius = scene.physics.radius();
   ContactFinder finder(
@@ -279,11 +278,6 @@ SimulationResult simulate(const SimulationOptions& options, const std::function<
     if (saved.state.step % options.save_every == 0 || saved.state.step == options.steps) files.save(saved);
     if (done) done(record);
   }
-  result.state = saved.state;
-  result.penetrations = saved.penetrations;
-  result.first_penetration = saved.first_penetration;
-  result.stalled = saved.stalled;
-  result.unconverged = saved.unconverged;
   return result;
 }
 

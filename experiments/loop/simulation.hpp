@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "experiments/loop/implicit_step.hpp"
+#include "experiments/loop/saved_state.hpp"
 
 namespace kbvh::experiments::loop {
 
@@ -23,14 +23,10 @@ struct SimulationOptions {
   std::filesystem::path folder{};  ///< empty: nothing is written, and nothing is continued
 };
 
-/// The outcome of the steps that a call of `simulate` made.
-struct SimulationResult {
-  State state;
-  std::uint64_t first_step = 0;         ///< where an earlier run was continued; 0: there was none
-  std::uint64_t penetrations = 0;       ///< intersecting pairs of triangles, summed over steps
-  std::uint64_t first_penetration = 0;  ///< the number of steps after which the first were counted; 0: none
-  bool too_near = false;  ///< no step followed the last one: it left a pair nearer than the thickness
-  std::uint64_t stalled = 0, unconverged = 0;  ///< steps with these endings
+/// The outcome of a call of `simulate`: where it ended, and what its own steps took.
+struct SimulationResult : SavedState {
+  std::uint64_t first_step = 0;  ///< where an earlier run was continued; 0: there was none
+  bool too_near = false;         ///< no step followed the last one: it left a pair nearer than the thickness
   double detect_seconds = 0, impact_seconds = 0, rest_seconds = 0;
 };
 

@@ -178,9 +178,6 @@ void iterates(const FramePair& frames, int repetitions, Table& table) {
   const double radius = 0.1 * edge;
   BroadPhase<double> each, bounded;
   CandidateBuffer out[2];
-  const auto view = [](const std::vector<double>& v) {
-    return MatrixView<double>::by_rows(v.data(), v.size() / 3, 3);
-  };
   each.build(mesh.view(0), mesh.e, mesh.f, radius);
   bounded.build(mesh.view(0), mesh.e, mesh.f, radius);
   bounded.valid_for(0.1 * edge);
@@ -193,7 +190,7 @@ void iterates(const FramePair& frames, int repetitions, Table& table) {
                     bounded.forget_trees();
                     const std::uint64_t before = bounded.detections();
                     for (const auto& v : positions) {
-                      bounded.update(view(v));
+                      bounded.update(points_of(v));
                       sum += bounded.candidates(CandidateKind::face_vertex).size() +
                              bounded.candidates(CandidateKind::edge_edge).size();
                     }
@@ -204,7 +201,7 @@ void iterates(const FramePair& frames, int repetitions, Table& table) {
                   [&] {
                     sum = 0;
                     for (const auto& v : positions) {
-                      each.update(view(v));
+                      each.update(points_of(v));
                       sum += detect_both(each, out);
                     }
                     return sum;
@@ -216,18 +213,10 @@ void iterates(const FramePair& frames, int repetitions, Table& table) {
 /// A sheet of n x n vertices, and the hundredth of them that moves: one patch, or scattered ones.
 class MovingSheet {
  public:
-  explicit MovingSheet(std::uint32_t n) {
+  explicit MovingSheet(std::uint32_t n) : e_(cloth_edges(n)), f_(cloth_faces(n)) {
     for (std::uint32_t y = 0; y < n; ++y)
-      for (std::uint32_t x = 0; x < n; ++x) {
-        const std::uint32_t i = y * n + x;
+      for (std::uint32_t x = 0; x < n; ++x)
         v_.insert(v_.end(), {float(x), float(y), float(std::sin(0.05 * x) * std::cos(0.04 * y))});
-        if (x + 1 < n) e_.insert(e_.end(), {i, i + 1});
-        if (y + 1 < n) e_.insert(e_.end(), {i, i + n});
-        if (x + 1 < n && y + 1 < n) {
-          e_.insert(e_.end(), {i + 1, i + n});
-          f_.insert(f_.end(), {i, i + 1, i + n, i + 1, i + n + 1, i + n});
-        }
-      }
     v_.push_back(0);  // readers may load four scalars
     const std::uint32_t count = n * n / 100, side = std::uint32_t(std::sqrt(double(count)));
     for (std::uint32_t y = 0; y < side; ++y)
@@ -235,7 +224,7 @@ class MovingSheet {
     for (std::uint32_t i = 0; i < count; ++i)
       scattered.push_back(std::uint32_t((std::uint64_t(i) * 7919 * 100) % (n * n)));
   }
-  MatrixView<float> view() const { return MatrixView<float>::by_rows(v_.data(), v_.size() / 3, 3); }
+  MatrixView<float> view() const { return points_of(v_); }
   MatrixView<std::uint32_t> edges() const {
     return MatrixView<std::uint32_t>::by_rows(e_.data(), e_.size() / 2, 2);
   }

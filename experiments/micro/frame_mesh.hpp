@@ -8,6 +8,12 @@
 
 namespace kbvh::experiments::micro {
 
+/// Returns a view of points, three numbers each.
+template <class S>
+MatrixView<S> points_of(const std::vector<S>& v) {
+  return MatrixView<S>::by_rows(v.data(), v.size() / 3, 3);
+}
+
 /// Two frames of a mesh, as a caller of the broad phase has them.
 template <class S>
 struct Mesh {
@@ -18,9 +24,7 @@ struct Mesh {
         f(MatrixView<std::uint32_t>::by_rows(frames.faces[0].data(), frames.faces.size(), 3)) {
     for (int i = 0; i < 2; ++i) v[i].assign(frames.positions[i].begin(), frames.positions[i].end());
   }
-  MatrixView<S> view(int frame) const {
-    return MatrixView<S>::by_rows(v[frame].data(), v[frame].size() / 3, 3);
-  }
+  MatrixView<S> view(int frame) const { return points_of(v[frame]); }
 };
 
 /// Detects face-vertex and edge-edge candidates; returns how many there are.

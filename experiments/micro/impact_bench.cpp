@@ -17,9 +17,9 @@
 
 #include "core/broad_phase/broad_phase.hpp"
 #include "core/continuous/impact_batch.hpp"
-#include "core/contract/registry.hpp"
 #include "experiments/common/environment.hpp"
 #include "experiments/study/impact_queries.hpp"
+#include "frame_mesh.hpp"
 #include "turns_table.hpp"
 
 namespace kbvh::experiments {
@@ -38,16 +38,9 @@ struct Pairs {
 template <class Take>
 void for_each(const FramePair& frames, const Pairs& pairs, const Take& take) {
   for (const auto& [first, second] : pairs.ids) {
-    std::uint32_t corners[4];
-    if (pairs.kind == Contact::Kind::vertex_face) {
-      corners[0] = first;
-      std::copy_n(frames.faces[second].begin(), 3, corners + 1);
-    } else {
-      std::copy_n(frames.edges[first].begin(), 2, corners);
-      std::copy_n(frames.edges[second].begin(), 2, corners + 2);
-    }
+    const std::array<std::uint32_t, 4> corners = frames.corners(pairs.kind, first, second);
     MovingPoints points;
-    for (int i = 0; i < 4; ++i) {
+    for (std::size_t i = 0; i < 4; ++i) {
       points.begin[i] = frames.positions[0].data() + std::size_t(3) * corners[i];
       points.end[i] = frames.positions[1].data() + std::size_t(3) * corners[i];
     }
@@ -97,10 +90,7 @@ struct Contestant {
 
 class Bench {
  public:
-  explicit Bench(int repetitions) : repetitions_(repetitions) {
-    for (const StrategyEntry& entry : registry())
-      if (entry.info.own_impact != nullptr) peers_.push_back({entry.info.id, entry.info.own_impact});
-  }
+  explicit Bench(int repetitions) : repetitions_(repetitions) {}
 
   void compare(const FramePair& frames, const Pairs& pairs) {
     if (pairs.ids.empty()) return;
@@ -159,27 +149,17 @@ class Bench {
   bool differs() const { return differs_; }
 
  private:
-  struct Peer {
-    std::string id;
-    bool (*touches)(Contact::Kind, const MovingPoints&);
-  };
-
   int repetitions_;
-  std::vector<Peer> peers_;
+  std::vector<ImpactPeer> peers_ = impact_peers();
   bool differs_ = false;
   nlohmann::json comparisons_ = nlohmann::json::array();
   micro::RatioTargets targets_;
 };
 
 void compare_frames(const FramePair& frames, Bench& bench) {
-  using View = MatrixView<double>;
-  using Ids = MatrixView<std::uint32_t>;
+  const micro::Mesh<double> mesh(frames);
   BroadPhase<double> broad;
-  const auto view = [&](int end) {
-    return View::by_rows(frames.positions[end].data(), frames.positions[end].size() / 3, 3);
-  };
-  broad.build(view(0), view(1), Ids::by_rows(frames.edges[0].data(), frames.edges.size(), 2),
-              Ids::by_rows(frames.faces[0].data(), frames.faces.size(), 3));
+  broad.build(mesh.view(0), mesh.view(1), mesh.e, mesh.f);
   for (const Contact::Kind kind : {Contact::Kind::vertex_face, Contact::Kind::edge_edge}) {
     const bool faces = kind == Contact::Kind::vertex_face;
     const std::string name = frames.name + (faces ? ", vertex-face" : ", edge-edge");

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/broad_phase/broad_phase.hpp"
+#include "frame_mesh.hpp"
 #include "turns_table.hpp"
 
 namespace kbvh::experiments::micro {
@@ -41,6 +41,17 @@ inline std::vector<std::uint32_t> cloth_faces(std::uint32_t n) {
   return f;
 }
 
+/// Returns the sides of the squares of a cloth, and their diagonals.
+inline std::vector<std::uint32_t> cloth_edges(std::uint32_t n) {
+  std::vector<std::uint32_t> e;
+  for (std::uint32_t i = 0; i < n * n; ++i) {
+    if (i % n + 1 < n) e.insert(e.end(), {i, i + 1});
+    if (i + n < n * n) e.insert(e.end(), {i, i + n});
+    if (i % n + 1 < n && i + n < n * n) e.insert(e.end(), {i + 1, i + n});
+  }
+  return e;
+}
+
 /// Self intersections of a cloth of 65,522 triangles, updates included, frame by frame.
 inline void self_intersections(const char* what, const std::vector<double>& swings, int repetitions,
                                Table& table) {
@@ -48,23 +59,20 @@ inline void self_intersections(const char* what, const std::vector<double>& swin
   const std::vector<std::uint32_t> f = cloth_faces(n);
   std::vector<std::vector<double>> frames;
   for (const double swing : swings) frames.push_back(folded_cloth(n, swing));
-  const auto view = [](const std::vector<double>& v) {
-    return MatrixView<double>::by_rows(v.data(), v.size() / 3, 3);
-  };
   CandidateBuffer out;
   SelfIntersectionStats stats[2];
   BroadPhase<double> broad[2];
   std::vector<Contestant> contestants;
   for (const bool cones : {true, false}) {
     BroadPhase<double>* const own = &broad[cones ? 0 : 1];
-    own->build(view(frames[0]), MatrixView<std::uint32_t>(),
+    own->build(points_of(frames[0]), MatrixView<std::uint32_t>(),
                MatrixView<std::uint32_t>::by_rows(f.data(), f.size() / 3, 3));
     contestants.push_back({std::string(what) + (cones ? ", cones" : ", none"), [&, own, cones] {
                              SelfIntersectionStats& counts = stats[cones ? 0 : 1];
                              counts = {};
                              std::size_t pairs = 0;
                              for (const auto& v : frames) {
-                               own->update(view(v));
+                               own->update(points_of(v));
                                own->self_intersections(out, cones ? SelfCulling::cones : SelfCulling::none,
                                                        &counts);
                                pairs += out.size();
@@ -87,26 +95,18 @@ inline void self_intersections(const char* what, const std::vector<double>& swin
 /// The earliest impact of the same cloth while it folds further, candidates included.
 inline void self_impacts(int repetitions, Table& table) {
   constexpr std::uint32_t n = 182;
-  const std::vector<std::uint32_t> f = cloth_faces(n);
-  std::vector<std::uint32_t> e;
-  for (std::uint32_t i = 0; i < n * n; ++i) {
-    if (i % n + 1 < n) e.insert(e.end(), {i, i + 1});
-    if (i + n < n * n) e.insert(e.end(), {i, i + n});
-    if (i % n + 1 < n && i + n < n * n) e.insert(e.end(), {i + 1, i + n});
-  }
+  const std::vector<std::uint32_t> f = cloth_faces(n), e = cloth_edges(n);
   const std::vector<double> begin = folded_cloth(n, 1.6), end = folded_cloth(n, 1.603);
-  const auto view = [](const std::vector<double>& v) {
-    return MatrixView<double>::by_rows(v.data(), v.size() / 3, 3);
-  };
   BroadPhase<double> broad[2];
   std::vector<Contestant> contestants;
   for (const bool cones : {true, false}) {
     BroadPhase<double>* const own = &broad[cones ? 0 : 1];
-    own->build(view(begin), view(end), MatrixView<std::uint32_t>::by_rows(e.data(), e.size() / 2, 2),
+    own->build(points_of(begin), points_of(end),
+               MatrixView<std::uint32_t>::by_rows(e.data(), e.size() / 2, 2),
                MatrixView<std::uint32_t>::by_rows(f.data(), f.size() / 3, 3));
     contestants.push_back(
         {std::string("impacts of a folding cloth") + (cones ? ", cones" : ", none"), [&, own, cones] {
-           own->update(view(begin), view(end));
+           own->update(points_of(begin), points_of(end));
            EarliestImpactStats stats;
            own->earliest_impact(0, &stats, cones ? SelfCulling::cones : SelfCulling::none);
            return std::size_t(stats.candidates);

@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "experiments/common/machine.hpp"
 #include "experiments/common/names.hpp"
 #include "experiments/common/text.hpp"
 #include "experiments/io/animated_mesh.hpp"
@@ -25,11 +26,6 @@ using nlohmann::json;
 namespace {
 
 constexpr const char* measuring_extension = ".measuring";
-
-std::string this_host() {
-  char name[256] = {};
-  return ::gethostname(name, sizeof name - 1) == 0 ? file_name(name) : "unknown";
-}
 
 struct Fault {
   int signal;
@@ -118,7 +114,7 @@ InProgress::InProgress(const std::filesystem::path& folder) {
     if (entry.path().extension() == measuring_extension && entry.is_regular_file(error))
       left.push_back(entry.path());
   for (const std::filesystem::path& file : left) read(file);
-  file_ = folder / (this_host() + "-" + std::to_string(::getpid()) + measuring_extension);
+  file_ = folder / (host_name() + "-" + std::to_string(::getpid()) + measuring_extension);
   descriptor_ = ::open(file_.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   fault_file = descriptor_;
 }
@@ -167,7 +163,7 @@ void InProgress::read(const std::filesystem::path& file) {
     return;
   }
   // A file of a process that still runs, perhaps on another machine, is in use.
-  const std::string name = file.stem().string(), here = this_host() + "-";
+  const std::string name = file.stem().string(), here = host_name() + "-";
   const auto process = name.starts_with(here) ? parse_whole(name.substr(here.size())) : std::nullopt;
   if (!process || (*process != std::uint64_t(::getpid()) && process_runs(*process))) return;
   if (!doing.empty()) killed_.push_back(doing);

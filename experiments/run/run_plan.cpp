@@ -34,16 +34,9 @@ using nlohmann::json;
 
 namespace {
 
-/// Returns the name of this machine as a part of a file name.
-std::string host() {
-  char name[256] = {};
-  if (::gethostname(name, sizeof name - 1) != 0) return "unknown";
-  return file_name(name);
-}
-
 /// Returns what identifies this invocation. Jobs run on several machines at the same time.
 std::string invocation(const std::string& job) {
-  return now_utc() + "-" + (job.empty() ? "" : host() + "-") + std::to_string(::getpid());
+  return now_utc() + "-" + (job.empty() ? "" : host_name() + "-") + std::to_string(::getpid());
 }
 
 /// Opens the results: those of a job are appended to a file of this process alone, because appending from

@@ -160,6 +160,16 @@ class ConfigHash {
 /// Throws io::InputError "scene: what is ..., must be from ... to ..." unless lowest <= value <= highest.
 void check_range(const char* scene, double value, double lowest, double highest, const char* what);
 
+/// Returns the number of solver steps per keyframe: the config's, or one by the distance of threads.
+template <class Config>
+std::uint32_t steps_per_keyframe(const Config& c, double spacing) {
+  if (c.substeps_per_keyframe > 0) return c.substeps_per_keyframe;
+  // One iteration per step leaves threads as stiff as mass / step^2: under the weight of half a metre of
+  // cloth they stretch by about 5 (step / spacing)^2.
+  const double steps = 1.0 / (c.keyframes_per_second * 0.025 * spacing);
+  return std::uint32_t(std::max(4.0, std::floor(steps) + 1.0));
+}
+
 /// Checks the parameters that all cloths have in common, by these names in their config: density, stiffness,
 /// drag, viscosity, friction and distance of layers. `check(value, lowest, highest, what)` is a `check_range`
 /// for the scene.

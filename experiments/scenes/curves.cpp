@@ -103,9 +103,7 @@ io::AnimatedMesh thrown_shards(const ThrownConfig& config) {
   check_triangles(config.triangles, "thrown_shards");
   const std::uint32_t count = config.triangles < 1 ? 1 : config.triangles;
   const SeededNoise noise(config.seed);
-  std::vector<std::uint32_t> corners(3 * std::size_t(count));
-  for (std::size_t v = 0; v < corners.size(); ++v) corners[v] = std::uint32_t(v);
-  io::AnimatedMesh mesh = triangle_mesh("thrown-shards", std::move(corners), {});
+  io::AnimatedMesh mesh = separate_triangles("thrown-shards", count);
   // Triangles of about the size that fills the ball; cube roots of libm differ between platforms.
   double size = 0.4;
   while (size * size * size * double(count) > 0.05) size *= 0.75;

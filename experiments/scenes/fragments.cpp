@@ -18,15 +18,6 @@ using cloth::Vec;
 
 namespace {
 
-/// Makes a mesh of separate triangles without positions.
-io::AnimatedMesh separate_triangles(const std::string& shape, std::uint32_t count) {
-  std::vector<std::uint32_t> corners(3 * std::size_t(count));
-  for (std::size_t v = 0; v < corners.size(); ++v) corners[v] = std::uint32_t(v);
-  io::AnimatedMesh mesh = triangle_mesh(shape, std::move(corners), {});
-  mesh.vertex_count = 3 * count;
-  return mesh;
-}
-
 /// Rotates p about a unit axis.
 Vec turned(const Vec& p, const Vec& axis, double turns) {
   const double c = cosine_of_turns(turns), s = sine_of_turns(turns);
@@ -178,12 +169,7 @@ io::AnimatedMesh flowing_soup(const AgeingConfig& config) {
   constexpr std::uint32_t steps = 2;
   const std::uint32_t count = std::max(1u, config.triangles);
   // As many cells as triangles fill the cube; a triangle is smaller than its cell.
-  double low = 0, high = 1;
-  for (int i = 0; i < 40; ++i) {
-    const double middle = 0.5 * (low + high);
-    (middle * middle * middle * double(count) > 1 ? high : low) = middle;
-  }
-  const double size = 0.45 * high;
+  const double size = 0.45 * cube_edge(1, count);
   io::AnimatedMesh mesh = separate_triangles("flowing-soup", count);
   mesh.keyframe_times = keyframe_times(config.keyframes, rate);
   const SeededNoise noise(config.seed);

@@ -49,14 +49,6 @@ class Timeline {
   std::int64_t first_;
 };
 
-std::uint32_t full_steps(const GarmentConfig& c, const GarmentPattern& pattern) {
-  if (c.substeps_per_keyframe > 0) return c.substeps_per_keyframe;
-  // As for the tablecloth: under the weight of half a metre of cloth, threads stretch by 5 (step /
-  // spacing)^2.
-  const double steps = 1.0 / (c.keyframes_per_second * 0.025 * pattern.spacing);
-  return std::uint32_t(std::max(4.0, std::floor(steps) + 1.0));
-}
-
 /// Simulates the whole motion of a garment in full: calls keep(keyframe, positions) from the first keyframe
 /// of the lead-in to `last`.
 template <class Keep>
@@ -66,7 +58,7 @@ void simulate_in_full(const GarmentConfig& config, const GarmentPattern& pattern
   WalkingFigure figure(config);
   figure.move_to(line.time(line.first()));
   GarmentSolver solver(config, pattern, GarmentSolver::Layers::apart);
-  const std::uint32_t steps = full_steps(config, pattern);
+  const std::uint32_t steps = cloth::steps_per_keyframe(config, pattern.spacing);
   const double dt = 1.0 / (config.keyframes_per_second * double(steps));
   keep(line.first(), solver.positions());
   for (std::int64_t k = line.first(); k < last; ++k) {
@@ -180,7 +172,7 @@ std::vector<io::AnimatedMesh> simulate_garment(const GarmentConfig& config, cons
   const GarmentPattern coarse =
       sew(shape, garment_counts(shape, config.full_triangles), WalkingFigure(config).walker(), cloth_margin);
   // The cost of either level by its steps and vertices, for the progress only.
-  const double coarse_work = double(coarse.rest.size()) * full_steps(config, coarse);
+  const double coarse_work = double(coarse.rest.size()) * cloth::steps_per_keyframe(config, coarse.spacing);
   const double fine_work = double(pattern.rest.size()) * 2 * config.fine_steps;
   const double share = coarse_work / (coarse_work + fine_work);
   std::vector<std::vector<Vec>> frames;

@@ -46,6 +46,23 @@ io::AnimatedMesh triangle_mesh(const std::string& shape, std::vector<std::uint32
   return mesh;
 }
 
+io::AnimatedMesh separate_triangles(const std::string& shape, std::uint32_t count) {
+  std::vector<std::uint32_t> corners(3 * std::size_t(count));
+  for (std::size_t v = 0; v < corners.size(); ++v) corners[v] = std::uint32_t(v);
+  io::AnimatedMesh mesh = triangle_mesh(shape, std::move(corners), {});
+  mesh.vertex_count = 3 * count;
+  return mesh;
+}
+
+double cube_edge(double volume, std::uint32_t count) {
+  double low = 0, high = 1;
+  for (int i = 0; i < 40; ++i) {
+    const double middle = 0.5 * (low + high);
+    (middle * middle * middle * double(count) > volume ? high : low) = middle;
+  }
+  return high;
+}
+
 void append_keyframe(io::AnimatedMesh& mesh, const std::vector<cloth::Vec>& positions) {
   for (const cloth::Vec& p : positions)
     for (const double x : {p.x, p.y, p.z}) mesh.positions.push_back(rounded_to_float(x));

@@ -23,6 +23,13 @@ std::uint32_t nearest_frequency(std::uint32_t triangles, std::uint32_t per_squar
 io::AnimatedMesh triangle_mesh(const std::string& shape, std::vector<std::uint32_t> corners,
                                std::vector<double> positions);
 
+/// Makes a mesh of separate triangles without positions.
+io::AnimatedMesh separate_triangles(const std::string& shape, std::uint32_t count);
+
+/// Returns the edge of the cubes of which `count` have this volume together: a multiple of 2^-40, at most 1.
+/// By bisection: libm's cube root differs between platforms.
+double cube_edge(double volume, std::uint32_t count);
+
 /// Appends one keyframe, rounded to float. The caller sets the times.
 void append_keyframe(io::AnimatedMesh& mesh, const std::vector<cloth::Vec>& positions);
 

@@ -346,13 +346,7 @@ io::AnimatedMesh random_soup(std::uint32_t triangles, std::uint64_t seed, std::u
   check_triangles(triangles, "random_soup");
   const std::uint32_t count = std::max(1u, triangles);
   const SeededNoise noise(seed);
-  // The edge of the cube that holds one triangle, by bisection: libm's cube root differs between platforms.
-  double low = 0.0, high = 1.0;
-  for (int i = 0; i < 40; ++i) {
-    const double middle = 0.5 * (low + high);
-    (middle * middle * middle * double(count) > 1.0 ? high : low) = middle;
-  }
-  const double size = high;
+  const double size = cube_edge(1, count);  // of the cube that holds one triangle
   std::vector<std::uint32_t> corners(3 * std::size_t(count));
   std::vector<double> positions(9 * std::size_t(count));
   for (std::size_t v = 0; v < corners.size(); ++v) {

@@ -239,12 +239,7 @@ struct Windings {
     for (std::uint32_t i = 0; i < rings; ++i) {
       const double left = 1 - 0.97 * double(i) / double(rings - 1);
       // The volume of the ball is that of its thread.
-      double low = 0, high = 1;
-      for (int n = 0; n < 40; ++n) {
-        const double middle = 0.5 * (low + high);
-        (middle * middle * middle > left ? high : low) = middle;
-      }
-      radius.push_back(ball * high);
+      radius.push_back(ball * cube_edge(left, 1));
       angles.push_back(angle);
       angle += step / (2 * pi * radius.back());
     }

@@ -119,14 +119,7 @@ class Swarms {
   double draw() { return noise_.signed_unit(draws_++); }
 
   /// Returns a body's radius as a share of its swarm's: the bodies fill a fifth of it.
-  static double fill(std::uint32_t count) {
-    double low = 0, high = 1;
-    for (int i = 0; i < 40; ++i) {
-      const double middle = 0.5 * (low + high);
-      (middle * middle * middle * double(count) > 0.2 ? high : low) = middle;
-    }
-    return std::min(0.4, high);
-  }
+  static double fill(std::uint32_t count) { return std::min(0.4, cube_edge(0.2, count)); }
 
   void attract() {
     std::fill(a_.begin(), a_.end(), Vec{});

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/base/interruption.hpp"
+#include "experiments/scenes/mesh_parts.hpp"
 
 namespace kbvh::scenes {
 namespace {
@@ -79,16 +80,8 @@ class ClothSolver {
 
   const std::vector<Vec>& positions() const { return x_; }
 
-  std::uint32_t substeps() const {
-    if (config_.substeps_per_keyframe > 0) return config_.substeps_per_keyframe;
-    // One iteration per step leaves threads as stiff as mass / step^2: under the weight of half a metre of
-    // cloth they stretch by about 5 (step / spacing)^2.
-    const double steps = 1.0 / (config_.keyframes_per_second * 0.025 * spacing_);
-    return std::uint32_t(std::max(4.0, std::floor(steps) + 1.0));
-  }
-
   void advance_keyframe() {
-    const std::uint32_t count = substeps();
+    const std::uint32_t count = cloth::steps_per_keyframe(config_, spacing_);
     const double dt = 1.0 / (config_.keyframes_per_second * double(count));
     for (std::uint32_t s = 0; s < count; ++s) {
       Interruptible::check();
@@ -298,8 +291,7 @@ std::vector<io::AnimatedMesh> simulate_tablecloth(const TableclothConfig& config
   ClothSolver solver(config, squares);
   for (std::uint32_t k = 0; k < config.keyframes; ++k) {
     if (k > 0) solver.advance_keyframe();
-    for (const auto& p : solver.positions())
-      for (const double x : {p.x, p.y, p.z}) cloth.positions.push_back(rounded_to_float(x));
+    append_keyframe(cloth, solver.positions());
     if (progress) progress(double(k + 1) / double(config.keyframes));
   }
   return bodies;

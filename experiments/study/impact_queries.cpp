@@ -4,6 +4,7 @@
 #include <boost/multiprecision/cpp_int.hpp>
 #include <cmath>
 
+#include "core/contract/registry.hpp"
 #include "core/motion/admissible.hpp"
 #include "experiments/common/json_reader.hpp"
 #include "experiments/common/names.hpp"
@@ -198,20 +199,13 @@ FramePair read_frame_pair(const fs::path& folder) {
 }
 
 ImpactQuery FramePair::query(const Listed& pair) const {
-  std::uint32_t corners[4];
-  if (pair.kind == Contact::Kind::vertex_face) {
-    corners[0] = pair.first;
-    std::copy_n(faces[pair.second].begin(), 3, corners + 1);
-  } else {
-    std::copy_n(edges[pair.first].begin(), 2, corners);
-    std::copy_n(edges[pair.second].begin(), 2, corners + 2);
-  }
+  const std::array<std::uint32_t, 4> vertices = corners(pair.kind, pair.first, pair.second);
   ImpactQuery query;
   query.kind = pair.kind;
   query.truth = pair.touches;
   for (std::size_t end = 0; end < 2; ++end)
     for (std::size_t i = 0; i < 4; ++i)
-      std::copy_n(positions[end].begin() + std::ptrdiff_t(3) * corners[i], 3, query.points[end][i]);
+      std::copy_n(positions[end].begin() + std::ptrdiff_t(3) * vertices[i], 3, query.points[end][i]);
   return query;
 }
 
@@ -262,6 +256,13 @@ std::vector<ImpactQueries> find_impact_queries(const fs::path& path) {
   } catch (const fs::filesystem_error& problem) {
     io::fail(problem.path1(), "", problem.code().message());
   }
+}
+
+std::vector<ImpactPeer> impact_peers() {
+  std::vector<ImpactPeer> found;
+  for (const StrategyEntry& entry : registry())
+    if (entry.info.own_impact != nullptr) found.push_back({entry.info.id, entry.info.own_impact});
+  return found;
 }
 
 }  // namespace kbvh::experiments

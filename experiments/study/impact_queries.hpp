@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <optional>
@@ -49,6 +50,17 @@ struct FramePair {
   };
   std::vector<Listed> listed;
 
+  /// Returns the vertices of a vertex and a face, or of two edges.
+  std::array<std::uint32_t, 4> corners(Contact::Kind kind, std::uint32_t first, std::uint32_t second) const {
+    std::array<std::uint32_t, 4> all{first};
+    if (kind == Contact::Kind::vertex_face) {
+      std::copy_n(faces[second].begin(), 3, all.begin() + 1);
+    } else {
+      std::copy_n(edges[first].begin(), 2, all.begin());
+      std::copy_n(edges[second].begin(), 2, all.begin() + 2);
+    }
+    return all;
+  }
   ImpactQuery query(const Listed& pair) const;
 };
 /// Reads a frame pair. Throws io::InputError.
@@ -59,5 +71,13 @@ bool is_frame_pair(const std::filesystem::path& folder);
 /// Returns all queries below a path: a file, a frame pair, or a folder of either. Sorted by name. Throws
 /// io::InputError if there are none.
 std::vector<ImpactQueries> find_impact_queries(const std::filesystem::path& path);
+
+/// A peer's own continuous test of two features.
+struct ImpactPeer {
+  std::string id;
+  bool (*touches)(Contact::Kind, const MovingPoints&);
+};
+/// Returns the peers with such a test that are built in.
+std::vector<ImpactPeer> impact_peers();
 
 }  // namespace kbvh::experiments

@@ -131,9 +131,6 @@ class Entrants {
   std::vector<E> entrants_;
 };
 
-/// Receives progress messages; may be empty.
-using MeasureProgress = std::function<void(const std::string&)>;
-
 /// The query of every frame, with space for its answer.
 struct FrameQuery {
   std::optional<Answer> changes{};  ///< the changes of this answer; otherwise the pairs

@@ -44,17 +44,8 @@ const char* word(Foresight foresight) {
   return "none";
 }
 
-json strategy_record(const ContestantSpec& spec) {
-  const Info& info = spec.entry->info;
-  json builder;
-  if (!info.topology.own)
-    builder = {{"method", name(spec.builder.method)},
-               {"width", spec.builder.width},
-               {"leaf_size", spec.builder.leaf_size}};
-  json params = json::object();
-  for (const auto& [key, value] : spec.params) params[key] = value;
+json about_strategy(const Info& info) {
   return {{"id", info.id},
-          {"label", spec.label},
           {"title", info.title},
           {"family", info.family},
           {"baseline", info.baseline},
@@ -66,9 +57,21 @@ json strategy_record(const ContestantSpec& spec) {
           {"own_scalar", info.own_scalar},
           {"version", info.version},
           {"instructions", info.instructions},
-          {"remark", info.remark},
-          {"params", params},
-          {"builder", builder}};
+          {"remark", info.remark}};
+}
+
+json in_words(const BuilderConfig& builder) {
+  return {{"method", name(builder.method)}, {"width", builder.width}, {"leaf_size", builder.leaf_size}};
+}
+
+json strategy_record(const ContestantSpec& spec) {
+  const Info& info = spec.entry->info;
+  json record = about_strategy(info);
+  record["label"] = spec.label;
+  record["builder"] = info.topology.own ? json() : in_words(spec.builder);
+  record["params"] = json::object();
+  for (const auto& [key, value] : spec.params) record["params"][key] = value;
+  return record;
 }
 
 }  // namespace kbvh::experiments

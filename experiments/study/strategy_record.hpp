@@ -10,6 +10,11 @@ const char* word(Tightness tightness);
 const char* word(Guarantee guarantee);
 const char* word(Foresight foresight);
 
+/// Returns what records and `kbvh list` say of a strategy.
+nlohmann::json about_strategy(const Info& info);
+/// Returns the method, width and leaf size of a builder.
+nlohmann::json in_words(const BuilderConfig& builder);
+
 /// Makes the "strategy" of a record.
 nlohmann::json strategy_record(const ContestantSpec& spec);
 

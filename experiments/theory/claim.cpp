@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <utility>
 
 #include "experiments/common/text.hpp"
 
@@ -73,6 +74,19 @@ Verdict verdict(const std::vector<Criterion>& criteria) {
     result = Verdict::with_condition;
   }
   return result;
+}
+
+void Claim::expect_at_most(std::string what, double value, double limit, Role role, double tolerance) {
+  criteria.push_back({std::move(what), value, Relation::at_most, limit, tolerance, role});
+}
+void Claim::expect_at_least(std::string what, double value, double limit, Role role) {
+  criteria.push_back({std::move(what), value, Relation::at_least, limit, 0, role});
+}
+void Claim::expect_equal(std::string what, double value, double limit, Role role) {
+  criteria.push_back({std::move(what), value, Relation::equal, limit, 0, role});
+}
+void Claim::expect_none(std::string what, double value, Role role) {
+  expect_equal(std::move(what), value, 0, role);
 }
 
 json to_json(const Claim& claim) {

@@ -50,6 +50,13 @@ struct Claim {
   nlohmann::json data;  ///< the deciding measurements
 
   Verdict verdict() const { return theory::verdict(criteria); }
+
+  /// Add a criterion: the value of a counter must be at most, at least or exactly `limit`, or 0.
+  void expect_at_most(std::string what, double value, double limit, Role role = Role::always,
+                      double tolerance = 0);
+  void expect_at_least(std::string what, double value, double limit, Role role = Role::always);
+  void expect_equal(std::string what, double value, double limit, Role role = Role::always);
+  void expect_none(std::string what, double value, Role role = Role::always);
 };
 
 /// Makes the claim of theory.json.

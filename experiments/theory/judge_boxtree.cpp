@@ -28,21 +28,17 @@ Claim judge_boxtree_size(const std::vector<BoxTreeRun>& boxtrees) {
   double most_memory = 0, most_events = 0;
   std::uint64_t of_planes = 0, of_roots = 0, compared = 0, fewer = 0;
   for (const BoxTreeRun& run : boxtrees) {
-    claim.criteria.push_back({"most events of an inner node's planes, " + place(run),
-                              double(run.most_of_planes), Relation::at_most, 2, 0, always});
-    claim.criteria.push_back({"most events alive, " + place(run), double(run.queue_peak), Relation::at_most,
-                              2 * double(run.inner_nodes) + 6 * double(run.trees), 0, always});
+    claim.expect_at_most("most events of an inner node's planes, " + place(run), run.most_of_planes, 2);
+    claim.expect_at_most("most events alive, " + place(run), run.queue_peak,
+                         2 * double(run.inner_nodes) + 6 * double(run.trees));
     const std::uint64_t roots = run.certificates - 2 * run.inner_nodes;
-    claim.criteria.push_back({"events compared with those of inner nodes, " + place(run), double(roots),
-                              Relation::at_most, 0, 0, as_stated});
-    claim.criteria.push_back(
-        {"bytes, " + place(run), double(run.bytes), Relation::at_most, double(run.aabb_bytes), 0, always});
+    claim.expect_at_most("events compared with those of inner nodes, " + place(run), roots, 0, as_stated);
+    claim.expect_at_most("bytes, " + place(run), run.bytes, run.aabb_bytes);
     of_planes = std::max(of_planes, run.most_of_planes);
     of_roots = std::max(of_roots, roots / std::max<std::uint64_t>(run.trees, 1));
     most_memory = std::max(most_memory, double(run.bytes) / double(run.aabb_bytes));
     if (run.aabb_events == 0) continue;
-    claim.criteria.push_back(
-        {"events, " + place(run), double(run.events), Relation::at_most, double(run.aabb_events), 0, always});
+    claim.expect_at_most("events, " + place(run), run.events, run.aabb_events);
     const double share = double(run.events) / double(run.aabb_events);
     most_events = std::max(most_events, share);
     fewer += share <= 1;
@@ -76,13 +72,10 @@ Claim judge_boxtree_qualities(const std::vector<BoxTreeRun>& boxtrees,
   std::uint64_t silent = 0, events = 0, proved = 0, wrong = 0;
   double local = 0;
   for (const BoxTreeRun& run : boxtrees) {
-    claim.criteria.push_back({"bounds that differ from their envelopes, " + place(run),
-                              run.violation.empty() ? 0.0 : 1.0, Relation::equal, 0, 0, always});
-    claim.criteria.push_back({"events that change no realiser, " + place(run), double(run.silent_events),
-                              Relation::equal, 0, 0, always});
+    claim.expect_none("bounds that differ from their envelopes, " + place(run), !run.violation.empty());
+    claim.expect_none("events that change no realiser, " + place(run), run.silent_events);
     const double bound = double(run.max_leaves_of_vertex) * (6 + 2 * (double(run.depth) + 6));
-    claim.criteria.push_back({"most certificates of a vertex, " + place(run),
-                              double(run.max_vertex_certificates), Relation::at_most, bound, 0, always});
+    claim.expect_at_most("most certificates of a vertex, " + place(run), run.max_vertex_certificates, bound);
     local = std::max(local, double(run.max_vertex_certificates) / bound);
     silent += run.silent_events, events += run.events, proved += run.proved, wrong += !run.violation.empty();
   }
@@ -90,18 +83,15 @@ Claim judge_boxtree_qualities(const std::vector<BoxTreeRun>& boxtrees,
   for (const SearchRun& run : searches) {
     const std::string where = run.tree + ", " + number(run.leaves) + " leaves";
     if (run.tree == "one axis") {
-      claim.criteria.push_back({"most nodes of a search, " + where, double(run.most_searched),
-                                Relation::at_most, 2 * std::ceil(std::log2(double(run.leaves))) + 1, 0,
-                                always});
+      claim.expect_at_most("most nodes of a search, " + where, run.most_searched,
+                           2 * std::ceil(std::log2(double(run.leaves))) + 1);
       one = &run;
     } else if (run.tree == "mixed") {
       mixed = &run;
     } else {
       // The claim says that this case is not responsive: a search through half of the tree proves it.
-      claim.criteria.push_back({"most nodes of a search, " + where, double(run.most_searched),
-                                Relation::at_least, double(run.leaves) - 1, 0, always});
-      claim.criteria.push_back({"events at the root's planes, " + where, double(run.events_of_root),
-                                Relation::at_least, 1, 0, always});
+      claim.expect_at_least("most nodes of a search, " + where, run.most_searched, double(run.leaves) - 1);
+      claim.expect_at_least("events at the root's planes, " + where, run.events_of_root, 1);
       adversarial = &run;
     }
   }

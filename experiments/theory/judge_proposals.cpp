@@ -52,7 +52,7 @@ Claim judge_order(const std::vector<OrderRun>& orders) {
     const std::string where = fmt::format(", {} children, {}", run.width, place(run));
     const auto compare = [&](const char* what, std::uint64_t mine, std::uint64_t bound, Role role,
                              std::vector<double>& shares) {
-      claim.criteria.push_back({what + where, double(mine), Relation::at_most, double(bound), 0, role});
+      claim.expect_at_most(what + where, mine, bound, role);
       shares.push_back(share(mine, bound));
     };
     compare("events", run.events, other.events, always, events);
@@ -101,17 +101,15 @@ Claim judge_rebuild(const std::vector<RebuildRun>& rebuilds) {
     if (other.box_tests == 0 || (run.box_tests == other.box_tests && run.events == other.events)) continue;
     clips.insert(place(run));
     const std::string where = fmt::format(", rebuilt by {}, {}", run.rebuild, place(run));
-    claim.criteria.push_back({"box tests" + where, double(run.box_tests), Relation::at_most,
-                              double(other.box_tests), 0, as_stated});
-    claim.criteria.push_back({"box tests and visited nodes" + where, double(run.box_tests + run.visited),
-                              Relation::at_most, double(other.box_tests + other.visited), 0, as_stated});
+    claim.expect_at_most("box tests" + where, run.box_tests, other.box_tests, as_stated);
+    claim.expect_at_most("box tests and visited nodes" + where, run.box_tests + run.visited,
+                         other.box_tests + other.visited, as_stated);
     tests.push_back(share(run.box_tests, other.box_tests));
     work.push_back(share(run.box_tests + run.visited, other.box_tests + other.visited));
     best = std::min(best, tests.back());
   }
   if (claim.criteria.empty()) return undecided(claim, "No part of a BoxTree was rebuilt.");
-  claim.criteria.push_back({"box tests over those without rebuilding, where rebuilding saves most", best,
-                            Relation::at_most, 1, 0, always});
+  claim.expect_at_most("box tests over those without rebuilding, where rebuilding saves most", best, 1);
   claim.measured = fmt::format("box tests {}, with visited nodes {} of those without rebuilding",
                                range(tests), range(work));
   claim.why = fmt::format(
@@ -140,12 +138,10 @@ Claim judge_sweeps(const std::vector<SweepRun>& sweeps) {
   std::uint64_t contacts = 0, different = 0, intervals = 0;
   std::vector<double> pairs;
   for (const SweepRun& run : sweeps) {
-    claim.criteria.push_back({"contacts that only one answer has, " + place(run), double(run.different),
-                              Relation::equal, 0, 0, always});
+    claim.expect_none("contacts that only one answer has, " + place(run), run.different);
     contacts += run.contacts, different += run.different, intervals += run.sweeps;
     if (run.refit_pairs == 0) continue;
-    claim.criteria.push_back({"pairs of triangles, " + place(run), double(run.list_pairs), Relation::at_most,
-                              double(run.refit_pairs), 0, as_stated});
+    claim.expect_at_most("pairs of triangles, " + place(run), run.list_pairs, run.refit_pairs, as_stated);
     pairs.push_back(share(run.list_pairs, run.refit_pairs));
   }
   if (contacts == 0) {
@@ -188,15 +184,12 @@ Claim judge_motion(const std::vector<MotionRun>& motions) {
     ++clips;
     const std::string where =
         fmt::format(", degree {}, {}, {} segments", run.degree, place(run), run.segments);
-    claim.criteria.push_back({"pairs that differ from the oracle's" + where, double(run.different),
-                              Relation::equal, 0, 0, always});
-    claim.criteria.push_back({"events at 10 frames per keyframe" + where, double(run.events), Relation::equal,
-                              double(run.events_at_keyframes), 0, always});
+    claim.expect_none("pairs that differ from the oracle's" + where, run.different);
+    claim.expect_equal("events at 10 frames per keyframe" + where, run.events, run.events_at_keyframes);
     frames += run.frames, different += run.different, pairs += run.pairs;
     degrees.insert(run.degree);
     if (run.events_on_lines == 0) continue;
-    claim.criteria.push_back({"events on curves" + where, double(run.events), Relation::at_most,
-                              2 * double(run.events_on_lines), 0, as_stated});
+    claim.expect_at_most("events on curves" + where, run.events, 2 * double(run.events_on_lines), as_stated);
     events.push_back(share(run.events, run.events_on_lines));
   }
   if (clips == 0) return undecided(claim, "No clip on curves has events and pairs.");

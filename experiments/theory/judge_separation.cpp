@@ -39,27 +39,23 @@ Claim judge_separation_list(const std::vector<SeparationRun>& separations) {
   double share = 0, list_share = 0;
   for (const SeparationRun& run : separations) {
     const std::string where = run.scene + ", " + number(run.polygons) + " polygons";
-    claim.criteria.push_back({"entries that differ from a traversal, " + where, double(run.differences),
-                              Relation::equal, 0, 0, always});
-    claim.criteria.push_back(
-        {"audits between events, " + where, double(run.audits), Relation::at_least, 1, 0, always});
+    claim.expect_none("entries that differ from a traversal, " + where, run.differences);
+    claim.expect_at_least("audits between events, " + where, run.audits, 1);
     const double bound = 1.4405 * std::log2(double(run.queue_peak + 12 * run.polygons) + 2) + 1;
     const SeparationRun::Kind* kinds[4] = {&run.overlap, &run.parents, &run.leaves, &run.changes};
     const char* names[4] = {"overlap", "parents apart", "leaves apart", "BV change"};
     for (int i = 0; i < 4; ++i) {
-      claim.criteria.push_back({std::string("comparisons per operation, ") + names[i] + ", " + where,
-                                kinds[i]->most_steps_per_operation, Relation::at_most, bound, 0, always});
+      claim.expect_at_most(std::string("comparisons per operation, ") + names[i] + ", " + where,
+                           kinds[i]->most_steps_per_operation, bound);
       share = std::max(share, kinds[i]->most_steps_per_operation / bound);
       events[i] += kinds[i]->events, pairs[i] += kinds[i]->pairs;
       if (i >= 2) continue;
-      claim.criteria.push_back({std::string("most pairs touched, ") + names[i] + ", " + where,
-                                double(kinds[i]->most_pairs), Relation::at_most, 4, 0, as_stated});
+      claim.expect_at_most(std::string("most pairs touched, ") + names[i] + ", " + where,
+                           kinds[i]->most_pairs, 4, as_stated);
       most = std::max(most, kinds[i]->most_pairs);
     }
-    claim.criteria.push_back({"pairs made or removed by leaves events, " + where, double(run.leaves.pairs),
-                              Relation::equal, 0, 0, always});
-    claim.criteria.push_back({"most pairs of a box, " + where, double(run.most_of_box), Relation::at_most,
-                              2 * double(run.polygons), 0, always});
+    claim.expect_none("pairs made or removed by leaves events, " + where, run.leaves.pairs);
+    claim.expect_at_most("most pairs of a box, " + where, run.most_of_box, 2 * double(run.polygons));
     audits += run.audits, entries += run.entries, differences += run.differences;
     of_box = std::max(of_box, run.most_of_box);
     list_share = std::max(list_share, double(run.list_peak) / double(run.polygons));
@@ -112,14 +108,13 @@ Claim judge_list_size(const std::vector<ListSizeRun>& sizes) {
     const PowerFit fit = fit_power(m, list);
     // "Practical cases" are scenes: a single one that grows faster makes a condition, all together a
     // refutation.
-    claim.criteria.push_back({"lower end of the exponent's 95% interval, " + scene, fit.low,
-                              Relation::at_most, 1, tolerance, as_stated});
+    claim.expect_at_most("lower end of the exponent's 95% interval, " + scene, fit.low, 1, as_stated,
+                         tolerance);
     exponents.push_back(fmt::format("{} {:.2f} ({:.2f} to {:.2f})", scene, fit.exponent, fit.low, fit.high));
     if (fit.low > 1 + tolerance) faster.push_back(scene);
   }
   if (exponents.empty()) return undecided(claim, "No list was made at four different sizes or more.");
-  claim.criteria.push_back({"scenes that grow faster", double(faster.size()), Relation::at_most,
-                            double(exponents.size()) - 1, 0, always});
+  claim.expect_at_most("scenes that grow faster", faster.size(), double(exponents.size()) - 1);
   claim.measured = "exponents: " + joined(exponents, "; ");
   claim.why = fmt::format("With m polygons in all, the list has at most {:.3g} m entries, and {}.", most,
                           faster.empty() ? "in none of " + counted(exponents.size(), "family") +

@@ -43,12 +43,9 @@ Claim judge_valid_at_all_times(const std::vector<ExactRun>& exact) {
   std::string violation;
   for (const ExactRun& run : exact) {
     const std::uint64_t wrong = run.violation.empty() ? 0 : 1;
-    claim.criteria.push_back(
-        {"logs that differ from the envelopes, " + place(run), double(wrong), Relation::equal, 0, 0, always});
-    claim.criteria.push_back(
-        {"realisers exceeded at audits, " + place(run), double(run.faults), Relation::equal, 0, 0, always});
-    claim.criteria.push_back({"realisers exceeded on paths of events, " + place(run), double(run.path_faults),
-                              Relation::equal, 0, 0, always});
+    claim.expect_none("logs that differ from the envelopes, " + place(run), wrong);
+    claim.expect_none("realisers exceeded at audits, " + place(run), run.faults);
+    claim.expect_none("realisers exceeded on paths of events, " + place(run), run.path_faults);
     if (wrong != 0 && violation.empty()) violation = place(run) + ": " + run.violation;
     logged += run.logged, bounds += run.bounds, instants += run.audited_instants, audited += run.audited;
     paths += run.path_bounds, events += run.events, faults += run.faults + run.path_faults;
@@ -79,10 +76,8 @@ Claim judge_compact(const std::vector<CountRun>& counts) {
   for (const CountRun& run : counts) {
     const double alive = double(run.queue_peak) / double(run.nodes);
     const double per_polygon = double(run.bytes) / double(run.triangles);
-    claim.criteria.push_back(
-        {"most events alive per node, " + place(run), alive, Relation::at_most, 6, 0, always});
-    claim.criteria.push_back({"most events of one node, " + place(run), double(run.most_of_node),
-                              Relation::at_most, 6, 0, always});
+    claim.expect_at_most("most events alive per node, " + place(run), alive, 6);
+    claim.expect_at_most("most events of one node, " + place(run), run.most_of_node, 6);
     most = std::max(most, alive);
     of_node = std::max(of_node, run.most_of_node);
     auto [at, fresh] = bytes.try_emplace(run.scene, per_polygon, per_polygon);
@@ -91,8 +86,8 @@ Claim judge_compact(const std::vector<CountRun>& counts) {
   }
   for (const auto& [scene, range] : bytes) {
     spread = std::max(spread, range.second / range.first);
-    claim.criteria.push_back({"bytes per polygon, most over least of all sizes, " + scene,
-                              range.second / range.first, Relation::at_most, 1, 0.1, always});
+    claim.expect_at_most("bytes per polygon, most over least of all sizes, " + scene,
+                         range.second / range.first, 1, always, 0.1);
   }
   claim.bound = "6 events per node; bytes per polygon equal over sizes to 10%";
   claim.measured =
@@ -129,15 +124,12 @@ Claim judge_responsive(const std::vector<CountRun>& counts) {
   const CountRun *largest = runs[0], *smallest = runs[0];
   for (const CountRun* run : runs) {
     const double bound = queue_steps_bound(*run);
-    claim.criteria.push_back({"depth of the tree, " + place(*run), double(run->depth), Relation::at_most,
-                              std::ceil(std::log2(double(run->triangles))) + 1, 0, always});
-    claim.criteria.push_back({"most nodes visited by an event, " + place(*run), double(run->max_visited),
-                              Relation::at_most, double(run->depth), 0, always});
-    claim.criteria.push_back({"most comparisons of an event, " + place(*run), double(run->max_steps),
-                              Relation::at_most, bound, 0, always});
-    claim.criteria.push_back({"most queue operations of an event, " + place(*run),
-                              double(run->max_operations), Relation::at_most, 2 * double(run->depth + 1) + 1,
-                              0, always});
+    claim.expect_at_most("depth of the tree, " + place(*run), run->depth,
+                         std::ceil(std::log2(double(run->triangles))) + 1);
+    claim.expect_at_most("most nodes visited by an event, " + place(*run), run->max_visited, run->depth);
+    claim.expect_at_most("most comparisons of an event, " + place(*run), run->max_steps, bound);
+    claim.expect_at_most("most queue operations of an event, " + place(*run), run->max_operations,
+                         2 * double(run->depth + 1) + 1);
     share = std::max(share, double(run->max_steps) / bound);
     if (run->depth > 0) path_share = std::max(path_share, double(run->max_visited) / double(run->depth));
     if (run->nodes > largest->nodes) largest = run;
@@ -177,20 +169,18 @@ Claim judge_local(const std::vector<CountRun>& counts, const std::vector<CountRu
   const CountRun* largest = &counts[0];
   for (const CountRun& run : counts) {
     const double bound = 6 * double(run.max_leaves_of_vertex) * double(run.depth + 1);
-    claim.criteria.push_back({"most certificates of a vertex, " + place(run),
-                              double(run.max_vertex_certificates), Relation::at_most, bound, 0, always});
-    claim.criteria.push_back(
-        {"share of the candidates above a vertex that a change of its plan examined, " + place(run),
-         run.update_share, Relation::at_most, 1, 0, always});
+    claim.expect_at_most("most certificates of a vertex, " + place(run), run.max_vertex_certificates, bound);
+    claim.expect_at_most(
+        "share of the candidates above a vertex that a change of its plan examined, " + place(run),
+        run.update_share, 1);
     share = std::max(share, double(run.max_vertex_certificates) / bound);
     update_share = std::max(update_share, run.update_share);
     updates += run.updates;
     if (run.nodes > largest->nodes) largest = &run;
   }
   for (const CountRun& fan : fans)
-    claim.criteria.push_back({"certificates of the hub of a fan of " + number(fan.triangles) + " triangles",
-                              double(fan.max_vertex_certificates), Relation::at_most,
-                              6 * 6 * double(fan.depth + 1), 0, as_stated});
+    claim.expect_at_most("certificates of the hub of a fan of " + number(fan.triangles) + " triangles",
+                         fan.max_vertex_certificates, 6 * 6 * double(fan.depth + 1), as_stated);
   claim.bound = "6 x leaves of the vertex x (depth + 1); changes: all candidates of the nodes above it";
   claim.measured = fmt::format(
       "at {}: {} at most, {:.3g} on average; a change examines {:.3g} candidates, {} at most",
@@ -222,16 +212,13 @@ Claim judge_efficient(const std::vector<CountRun>& counts, const std::vector<Exa
   if (counts.empty() && exact.empty()) return undecided(claim, "Nothing was counted.");
   std::uint64_t events = 0, silent = 0, exact_events = 0, momentary = 0, tied = 0;
   for (const CountRun& run : counts) {
-    claim.criteria.push_back({"events that change no realiser, " + place(run), double(run.silent_events),
-                              Relation::equal, 0, 0, always});
+    claim.expect_none("events that change no realiser, " + place(run), run.silent_events);
     events += run.events, silent += run.silent_events;
   }
   for (const ExactRun& run : exact) {
-    claim.criteria.push_back({"events without duration, at most those of ties, " + place(run),
-                              double(run.momentary_events), Relation::at_most, double(run.several_steps), 0,
-                              always});
-    claim.criteria.push_back({"events without duration, " + place(run), double(run.momentary_events),
-                              Relation::equal, 0, 0, as_stated});
+    claim.expect_at_most("events without duration, at most those of ties, " + place(run),
+                         run.momentary_events, run.several_steps);
+    claim.expect_none("events without duration, " + place(run), run.momentary_events, as_stated);
     exact_events += run.events, momentary += run.momentary_events, tied += run.momentary_events > 0;
   }
   claim.measured = fmt::format("{} of {} events change no realiser; {} of {} have no duration",

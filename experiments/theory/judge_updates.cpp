@@ -98,34 +98,32 @@ Claim judge_number_of_events(const std::vector<CountRun>& counts, const std::vec
   double share = 0, fullest = 0;
   std::uint64_t pieces = 0, over = 0, most = 0;
   for (const CountRun& run : counts) {
-    claim.criteria.push_back({"changes of a clip, " + place(run), double(run.values), Relation::at_most,
-                              run.breakpoint_bound, 0, always});
-    claim.criteria.push_back({"events of a clip, " + place(run), double(run.events), Relation::at_most,
-                              run.breakpoint_bound, 0, always});
+    claim.expect_at_most("changes of a clip, " + place(run), run.values, run.breakpoint_bound);
+    claim.expect_at_most("events of a clip, " + place(run), run.events, run.breakpoint_bound);
     share = std::max(share, double(run.values) / run.breakpoint_bound);
   }
   for (const ExactRun& run : exact) {
-    claim.criteria.push_back({"envelopes with more than n - 1 breakpoints in a segment, " + place(run),
-                              double(run.over_lambda), Relation::equal, 0, 0, always});
+    claim.expect_none("envelopes with more than n - 1 breakpoints in a segment, " + place(run),
+                      run.over_lambda);
     pieces += run.pieces, over += run.over_lambda;
     fullest = std::max(fullest, run.fullest), most = std::max(most, run.most_breakpoints);
   }
   for (const CurveRun& run : curves) {
-    claim.criteria.push_back(
-        {fmt::format("bounds with more than lambda_{}(n) - 1 changes in a segment, {}, {} segments",
-                     run.order, place(run), run.segments),
-         double(run.over_lambda), Relation::equal, 0, 0, always});
+    claim.expect_none(
+        fmt::format("bounds with more than lambda_{}(n) - 1 changes in a segment, {}, {} segments", run.order,
+                    place(run), run.segments),
+        run.over_lambda);
     if (run.built > 0)
-      claim.criteria.push_back({fmt::format("changes of a bound of {} {} that are built for this number",
-                                            number(run.vertices), run.scene),
-                                double(run.most_changes), Relation::equal, double(run.built), 0, always});
+      claim.expect_equal(fmt::format("changes of a bound of {} {} that are built for this number",
+                                     number(run.vertices), run.scene),
+                         run.most_changes, run.built);
   }
   std::vector<std::string> exponents, faster;
   double worst = 0;
   std::size_t sizes = 0;
   for (const GrowthFit& fit : fits) {
-    claim.criteria.push_back({"lower end of the exponent's 95% interval, " + fit.scene, fit.low,
-                              Relation::at_most, 1, tolerance, as_stated});
+    claim.expect_at_most("lower end of the exponent's 95% interval, " + fit.scene, fit.low, 1, as_stated,
+                         tolerance);
     exponents.push_back(fmt::format("{} {:.2f} ({:.2f} to {:.2f}), {:.3g} n log n", fit.scene, fit.exponent,
                                     fit.low, fit.high, fit.constant));
     if (fit.low > 1 + tolerance) faster.push_back(fit.scene);
@@ -177,16 +175,15 @@ Claim judge_independent_of_frames(const std::vector<FrameRun>& frames) {
     for (const FrameRun* run : runs) {
       const double off = std::abs(double(run->events) - double(first.events)) +
                          std::abs(double(run->values) - double(first.values));
-      claim.criteria.push_back(
-          {"events and changes compared with those of l = " + std::to_string(first.l) + ", " + place(*run),
-           off, Relation::equal, 0, 0, always});
-      claim.criteria.push_back({"the log of changes is the same (1), " + place(*run), double(run->same_log),
-                                Relation::equal, 1, 0, always});
+      claim.expect_none(
+          "events and changes compared with those of l = " + std::to_string(first.l) + ", " + place(*run),
+          off);
+      claim.expect_equal("the log of changes is the same (1), " + place(*run), run->same_log, 1);
       const double expected = double(run->frames) / double(first.frames);
       const double measured = double(run->bottom_up_values) / double(first.bottom_up_values);
-      claim.criteria.push_back(
-          {"bottom-up's values compared with those of l = " + std::to_string(first.l) + ", " + place(*run),
-           measured, Relation::equal, expected, 0, always});
+      claim.expect_equal(
+          "bottom-up's values compared with those of l = " + std::to_string(first.l) + ", " + place(*run),
+          measured, expected);
       spread = std::max(spread, off);
       differ += run->same_log != 1;
       grows = std::max(grows, measured);
@@ -221,26 +218,23 @@ Claim judge_optimal(const std::vector<ExactRun>& exact, const std::vector<LooseR
   if (exact.empty()) return undecided(claim, "No clip was proved.");
   std::uint64_t logged = 0, net = 0, envelope = 0, ties = 0, general = 0;
   for (const ExactRun& run : exact) {
-    claim.criteria.push_back({"logs that differ from the envelopes, " + place(run),
-                              run.violation.empty() ? 0.0 : 1.0, Relation::equal, 0, 0, always});
-    claim.criteria.push_back(
-        {"net changes, " + place(run), double(run.net), Relation::equal, double(run.envelope), 0, always});
-    claim.criteria.push_back({"changes beyond net ones, compared with those of ties, " + place(run),
-                              double(run.logged) - double(run.net), Relation::equal,
-                              double(run.several_steps), 0, always});
-    claim.criteria.push_back({"changes beyond net ones, " + place(run), double(run.logged) - double(run.net),
-                              Relation::equal, 0, 0, as_stated});
+    claim.expect_none("logs that differ from the envelopes, " + place(run), !run.violation.empty());
+    claim.expect_equal("net changes, " + place(run), run.net, run.envelope);
+    claim.expect_equal("changes beyond net ones, compared with those of ties, " + place(run),
+                       double(run.logged) - double(run.net), run.several_steps);
+    claim.expect_none("changes beyond net ones, " + place(run), double(run.logged) - double(run.net),
+                      as_stated);
     logged += run.logged, net += run.net, envelope += run.envelope, ties += run.several_steps;
     general += run.several_steps == 0 && run.choices == 0;
   }
   std::uint64_t kinetic = 0, outside = 0;
   double least_loose = 1e300, most_loose = 0;
   for (const LooseRun& run : loose) {
-    claim.criteria.push_back({"constant boxes that do not contain a vertex at a frame, " + place(run),
-                              double(run.swept_outside), Relation::equal, 0, 0, always});
-    claim.criteria.push_back(
-        {"changes of the kinetic tree compared with the updates of constant boxes, " + place(run),
-         double(run.kinetic_values), Relation::at_most, double(run.swept_updates), 0, as_stated});
+    claim.expect_none("constant boxes that do not contain a vertex at a frame, " + place(run),
+                      run.swept_outside);
+    claim.expect_at_most(
+        "changes of the kinetic tree compared with the updates of constant boxes, " + place(run),
+        run.kinetic_values, run.swept_updates, as_stated);
     kinetic += run.kinetic_values, outside += run.swept_outside;
     least_loose = std::min(least_loose, run.swept_looseness);
     most_loose = std::max(most_loose, run.swept_looseness);
@@ -278,11 +272,9 @@ Claim judge_never_more_updates(const std::vector<FrameRun>& frames,
   std::uint64_t all = 0, repeated = 0, worse = 0, made_worse = 0;
   double worst = 0;
   const auto judge = [&](const FrameRun& run) {
-    claim.criteria.push_back(
-        {"frames with more values than bottom-up although no bound changes twice, " + place(run),
-         double(run.worse_without_repeat), Relation::equal, 0, 0, always});
-    claim.criteria.push_back({"frames with more values than bottom-up, " + place(run),
-                              double(run.worse_frames), Relation::equal, 0, 0, as_stated});
+    claim.expect_none("frames with more values than bottom-up although no bound changes twice, " + place(run),
+                      run.worse_without_repeat);
+    claim.expect_none("frames with more values than bottom-up, " + place(run), run.worse_frames, as_stated);
   };
   for (const FrameRun& run : frames) {
     judge(run);
@@ -317,12 +309,10 @@ Claim judge_translation(const std::vector<TranslationRun>& translations) {
       .data = translations};
   if (translations.empty()) return undecided(claim, "No translation was played.");
   for (const TranslationRun& run : translations) {
-    claim.criteria.push_back(
-        {"events, " + run.scene, double(run.events), Relation::equal, 0, 0, run.exact ? always : as_stated});
+    claim.expect_none("events, " + run.scene, run.events, run.exact ? always : as_stated);
     if (!run.exact)
-      claim.criteria.push_back({"events other than separating ties, " + run.scene,
-                                double(run.events) - double(run.separated_ties), Relation::equal, 0, 0,
-                                always});
+      claim.expect_none("events other than separating ties, " + run.scene,
+                        double(run.events) - double(run.separated_ties));
     const std::string keyframes = counted(run.keyframes, "keyframe");
     claim.measured +=
         fmt::format("{}{}: {} events", claim.measured.empty() ? "" : "; ", run.scene, number(run.events));
@@ -357,17 +347,14 @@ Claim judge_plan_changes(const std::vector<PlanRun>& plans) {
   std::uint64_t updates = 0, at_keyframes = 0, changed = 0, moved = 0, moved_at_keyframes = 0, invalid = 0,
                 topology = 0, wrong = 0;
   for (const PlanRun& run : plans) {
-    claim.criteria.push_back({"stops at which the topology differs, " + place(run),
-                              double(run.topology_changes), Relation::equal, 0, 0, always});
-    claim.criteria.push_back({"bounds exceeded before and after updates, " + place(run),
-                              double(run.invalid_before + run.invalid_after), Relation::equal, 0, 0, always});
-    claim.criteria.push_back({"clips that differ from their envelopes, " + place(run),
-                              run.violation.empty() ? 0.0 : 1.0, Relation::equal, 0, 0, always});
-    claim.criteria.push_back({"realisers changed by updates that start where the plan is, " + place(run),
-                              double(run.moved_at_keyframes), Relation::equal, 0, 0, always});
-    claim.criteria.push_back({"realisers changed by updates, " + place(run),
-                              double(run.moved_at_keyframes + run.moved_between), Relation::equal, 0, 0,
-                              as_stated});
+    claim.expect_none("stops at which the topology differs, " + place(run), run.topology_changes);
+    claim.expect_none("bounds exceeded before and after updates, " + place(run),
+                      run.invalid_before + run.invalid_after);
+    claim.expect_none("clips that differ from their envelopes, " + place(run), !run.violation.empty());
+    claim.expect_none("realisers changed by updates that start where the plan is, " + place(run),
+                      run.moved_at_keyframes);
+    claim.expect_none("realisers changed by updates, " + place(run),
+                      run.moved_at_keyframes + run.moved_between, as_stated);
     updates += run.updates, at_keyframes += run.updates_at_keyframes, changed += run.changed_plans;
     moved += run.moved_between, moved_at_keyframes += run.moved_at_keyframes;
     invalid += run.invalid_before + run.invalid_after, topology += run.topology_changes;
@@ -403,9 +390,8 @@ Claim judge_lower_bound(const std::vector<LooseRun>& loose) {
   for (const LooseRun& run : loose) {
     // Only valid hierarchies can refute the claim, and only where there are events.
     if (run.linear_outside != 0 || run.swept_outside != 0 || run.kinetic_events == 0) continue;
-    claim.criteria.push_back({"updates between keyframes of a valid hierarchy, " + place(run),
-                              double(run.linear_updates), Relation::at_least, double(run.kinetic_events), 0,
-                              always});
+    claim.expect_at_least("updates between keyframes of a valid hierarchy, " + place(run), run.linear_updates,
+                          run.kinetic_events);
     events += run.kinetic_events, values += run.kinetic_values, computed += run.linear_values;
     bottom_up += run.bottom_up_values, bounds += run.bounds, frames += run.frames;
     most_loose = std::max(most_loose, run.linear_looseness);

@@ -72,9 +72,7 @@ BoxTreeRun measure_boxtree(const Scene<float>& scene, const CountRun& counts, Pr
   Playback<float> playback(scene);
   playback.seek(keyframes.front());
   const Topologies topologies = build_topologies(view, playback, paper_builder);
-  BoxTreeRun run;
-  run.scene = scene.name;
-  run.triangles = scene.primitive_count();
+  BoxTreeRun run{.scene = scene.name, .triangles = scene.primitive_count()};
   run.aabb_events = counts.events, run.aabb_values = counts.values, run.aabb_bytes = counts.bytes;
   run.depth = counts.depth;
   SteppedStrategy paper(

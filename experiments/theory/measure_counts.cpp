@@ -159,9 +159,7 @@ CountRun measure_counts(const Scene<float>& scene) {
   playback.evaluate_all();
   const Topologies topologies = build_topologies(view, playback, paper_builder);
 
-  CountRun run;
-  run.scene = scene.name;
-  run.triangles = scene.primitive_count();
+  CountRun run{.scene = scene.name, .triangles = scene.primitive_count()};
   run.vertices = scene.vertex_count();
   run.segments = keyframes.size() - 1;
   for (std::uint32_t body = 0; body < view.body_count(); ++body) {

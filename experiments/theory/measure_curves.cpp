@@ -1,7 +1,6 @@
 #include "experiments/theory/measure_curves.hpp"
 
 #include <algorithm>
-#include <iterator>
 #include <vector>
 
 #include "core/contract/registry.hpp"
@@ -9,43 +8,13 @@
 #include "core/families/events/any_queue.hpp"
 #include "core/families/events/event_log.hpp"
 #include "core/families/events/kinetic_forest.hpp"
+#include "experiments/theory/kinetic_log.hpp"
 
 namespace kbvh::theory {
 
 namespace {
 
 using Forest = KineticForest<float, AnyEventQueue<AlgebraicClock<float>>, BoundObserver<float>>;
-
-/// Returns the number of different vertices below each node.
-template <class Tree>
-std::vector<std::size_t> vertices_below(const Tree& tree) {
-  const Topology& topology = tree.topology();
-  std::vector<std::vector<std::uint32_t>> below(topology.size());
-  std::vector<std::size_t> counts(topology.size());
-  for (std::uint32_t node = topology.size(); node-- > 0;) {
-    const auto leaf = tree.leaf_vertices(node);
-    if (!leaf.empty()) below[node].assign(leaf.begin(), leaf.end());
-    counts[node] = below[node].size();
-    if (node == 0) break;
-    std::vector<std::uint32_t> both;
-    auto& above = below[topology.parents[node]];
-    std::set_union(above.begin(), above.end(), below[node].begin(), below[node].end(),
-                   std::back_inserter(both));
-    above = std::move(both);
-    below[node] = {};
-  }
-  return counts;
-}
-
-std::uint64_t order_of(const Scene<float>& scene) {
-  std::uint64_t order = 1;
-  for (const Body<float>& body : scene.bodies)
-    for (std::size_t k = 0; k + 1 < body.plans.keyframe_count(); ++k) {
-      if (!body.plans.curved_in(k)) continue;
-      order = std::max<std::uint64_t>(order, body.plans.twists(k) != nullptr ? 3 : 2);
-    }
-  return order;
-}
 
 /// The changes of one bound in the segment that it is in.
 struct Bound {
@@ -54,6 +23,15 @@ struct Bound {
 };
 
 }  // namespace
+
+std::uint64_t degree_of(const Scene<float>& scene) {
+  std::uint64_t degree = 1;
+  for (const Body<float>& body : scene.bodies)
+    for (std::size_t k = 0; k + 1 < body.plans.keyframe_count(); ++k)
+      if (body.plans.curved_in(k))
+        degree = std::max<std::uint64_t>(degree, body.plans.twists(k) != nullptr ? 3 : 2);
+  return degree;
+}
 
 double most_pieces(std::uint64_t order, std::uint64_t n) {
   if (order <= 1) return double(n);
@@ -64,7 +42,7 @@ double most_pieces(std::uint64_t order, std::uint64_t n) {
 }
 
 CurveRun measure_curves(const Scene<float>& scene) {
-  CurveRun run{.scene = scene.name, .order = order_of(scene)};
+  CurveRun run{.scene = scene.name, .order = degree_of(scene)};
   const SceneView<float> view(scene);
   Playback<float> playback(scene);
   Counters count;
@@ -74,20 +52,20 @@ CurveRun measure_curves(const Scene<float>& scene) {
   Forest forest(view, ClipMotion<float>(playback),
                 build_topologies(view, playback, {.method = BuildMethod::median, .width = 2, .leaf_size = 1}),
                 count, BoundObserver<float>{&watch});
-  std::vector<std::vector<std::size_t>> below;
+  std::vector<VerticesBelow> below;
   std::vector<std::vector<Bound>> bounds;
   for (std::uint32_t body = 0; body < forest.size(); ++body) {
     const Body<float>& one = scene.bodies[body];
     run.triangles += one.primitives.count();
     run.vertices += one.plans.vertex_count();
     run.segments = std::max<std::uint64_t>(run.segments, one.plans.keyframe_count() - 1);
-    below.push_back(vertices_below(forest.tree(body)));
+    below.push_back(vertices_below(forest.tree(body).topology(), one.primitives));
     bounds.emplace_back(std::size_t(6) * below.back().size());
     run.bounds += bounds.back().size();
     run.pieces += bounds.back().size() * (one.plans.keyframe_count() - 1);
   }
   const auto finish = [&](std::uint32_t body, std::size_t at) {
-    const std::size_t n = below[body][at / 6];
+    const std::size_t n = below[body][at / 6].size();
     const double most = most_pieces(run.order, n) - 1;
     const auto changes = bounds[body][at].changes;
     run.most_changes = std::max(run.most_changes, changes);

@@ -127,29 +127,16 @@ ExactRun measure_exact(const Scene<float>& scene, std::uint32_t instants) {
       record_strategy<float>(find_strategy("kinetic_aabb"), scene, {}, play, Auditor(scene, run));
   run.events = recording.events;
 
-  EnvelopeReport total;
   for (const Epoch<float>& epoch : recording.epochs)
     for (std::uint32_t body = 0; body < scene.bodies.size(); ++body) {
       try {
         const Case one = make_case(scene, recording, epoch, body);
-        total.add(one.check());
+        run.add(one.check());
         run.momentary_events += momentary(one, 6 * one.below.size());
       } catch (const std::logic_error& error) {
-        total.violation = error.what();  // an event whose pieces do not meet, or not in the clip
+        run.violation = error.what();  // an event whose pieces do not meet, or not in the clip
       }
     }
-  run.violation = total.violation;
-  run.bounds = total.bounds;
-  run.logged = total.logged;
-  run.net = total.net;
-  run.envelope = total.envelope;
-  run.canonical = total.canonical;
-  run.several_steps = total.several_steps;
-  run.choices = total.choices;
-  run.pieces = total.pieces;
-  run.over_lambda = total.over_lambda;
-  run.most_breakpoints = total.most_breakpoints;
-  run.fullest = total.fullest;
   return run;
 }
 
@@ -181,9 +168,7 @@ struct SameNodes {
 
 PlanRun measure_plan_changes(const Scene<float>& scene, const PlanScript<float>& script,
                              std::uint32_t frames_per_keyframe) {
-  PlanRun run;
-  run.scene = scene.name;
-  run.triangles = scene.primitive_count();
+  PlanRun run{.scene = scene.name, .triangles = scene.primitive_count()};
   const std::vector<double> keyframes = overlaid_keyframes(scene);
   Play play{paper_builder, frames_per_keyframe};
   const SceneView<float> view(scene);

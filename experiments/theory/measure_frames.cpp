@@ -96,9 +96,7 @@ std::vector<FrameRun> measure_frames(const Scene<float>& scene, std::span<const 
   std::vector<Notice<float>> first_log;
   for (const std::uint32_t l : ls) {
     const std::vector<double> frames = frame_times(scene, l);
-    FrameRun run;
-    run.scene = scene.name;
-    run.triangles = scene.primitive_count();
+    FrameRun run{.scene = scene.name, .triangles = scene.primitive_count()};
     run.l = l;
     run.frames = frames.size() - 1;
     const auto recording =
@@ -165,9 +163,7 @@ LooseRun measure_loose(const Scene<float>& scene, std::uint32_t l) {
   Playback<float> playback(scene);
   playback.seek(frames.front());
   const Topologies topologies = build_topologies(view, playback, paper_builder);
-  LooseRun run;
-  run.scene = scene.name;
-  run.triangles = scene.primitive_count();
+  LooseRun run{.scene = scene.name, .triangles = scene.primitive_count()};
   run.l = l;
   run.frames = frames.size();
   run.segments = overlaid_keyframes(scene).size() - 1;

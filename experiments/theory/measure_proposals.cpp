@@ -11,6 +11,7 @@
 #include "core/judge/oracle.hpp"
 #include "core/judge/session.hpp"
 #include "experiments/theory/measure_counts.hpp"
+#include "experiments/theory/measure_curves.hpp"
 
 namespace kbvh::theory {
 
@@ -33,13 +34,10 @@ Counters play(const Scene<float>& scene, const Contestant& contestant, std::uint
   Session<float> session(scene, contestant);
   PairBuffer pairs;
   PhaseTimes times;
-  bool first = true;
-  for (const double t : frame_times(scene, l)) {
-    if (first)
-      session.reset(t);
-    else
-      session.advance(t, times);
-    first = false;
+  const std::vector<double> frames = frame_times(scene, l);
+  session.reset(frames.front());
+  for (const double t : frames) {
+    if (t > frames.front()) session.advance(t, times);
     session.query(pairs, times);
     seen(t, pairs);
   }
@@ -91,16 +89,14 @@ OrderRun measure_order(const Scene<float>& scene, std::uint32_t width) {
   builder.width = width;
   const Counters counts =
       play(scene, contestant_of("kinetic_aabb", {{"queue", "avl"}, {"query", "nodes"}}, builder), usual_l);
-  OrderRun run;
-  run.scene = scene.name;
-  run.triangles = scene.primitive_count();
-  run.width = width;
-  run.events = counts[Counter::certificates_failed];
-  run.values = counts[Counter::values_written];
-  run.certificates = counts[Counter::certificates_made];
-  run.steps = counts[Counter::queue_steps];
-  run.box_tests = counts[Counter::box_tests];
-  return run;
+  return {.scene = scene.name,
+          .triangles = scene.primitive_count(),
+          .width = width,
+          .events = counts[Counter::certificates_failed],
+          .values = counts[Counter::values_written],
+          .certificates = counts[Counter::certificates_made],
+          .steps = counts[Counter::queue_steps],
+          .box_tests = counts[Counter::box_tests]};
 }
 
 RebuildRun measure_rebuild(const Scene<float>& scene, const std::string& rebuild) {
@@ -113,20 +109,16 @@ RebuildRun measure_rebuild(const Scene<float>& scene, const std::string& rebuild
                                               {"rebuild", rebuild}},
                                              paper_builder),
                                usual_l);
-  RebuildRun run;
-  run.scene = scene.name;
-  run.triangles = scene.primitive_count();
-  run.rebuild = rebuild;
-  run.events = counts[Counter::certificates_failed];
-  run.visited = counts[Counter::nodes_visited];
-  run.box_tests = counts[Counter::box_tests];
-  return run;
+  return {.scene = scene.name,
+          .triangles = scene.primitive_count(),
+          .rebuild = rebuild,
+          .events = counts[Counter::certificates_failed],
+          .visited = counts[Counter::nodes_visited],
+          .box_tests = counts[Counter::box_tests]};
 }
 
 SweepRun measure_sweeps(const Scene<float>& scene) {
-  SweepRun run;
-  run.scene = scene.name;
-  run.triangles = scene.primitive_count();
+  SweepRun run{.scene = scene.name, .triangles = scene.primitive_count()};
   const std::vector<double> keyframes = overlaid_keyframes(scene);
   Session<float> list(scene, contestant_of("kinetic_separation_list", {{"queue", "avl"}}, paper_builder)),
       refit(scene, contestant_of("bottom_up", {}, paper_builder)),
@@ -152,15 +144,9 @@ SweepRun measure_sweeps(const Scene<float>& scene) {
 }
 
 MotionRun measure_motion(const Scene<float>& scene) {
-  MotionRun run;
-  run.scene = scene.name;
-  run.triangles = scene.primitive_count();
+  MotionRun run{.scene = scene.name, .triangles = scene.primitive_count()};
   run.segments = overlaid_keyframes(scene).size() - 1;
-  run.degree = 1;
-  for (const Body<float>& body : scene.bodies)
-    for (std::size_t k = 0; k + 1 < body.plans.keyframe_count(); ++k)
-      if (body.plans.curved_in(k))
-        run.degree = std::max<std::uint64_t>(run.degree, body.plans.twists(k) != nullptr ? 3 : 2);
+  run.degree = degree_of(scene);
   const Contestant contestant = contestant_of("kinetic_aabb", {{"queue", "avl"}}, paper_builder);
   Playback<float> playback(scene);
   const auto compare = [&](double t, const PairBuffer& found) {

@@ -141,9 +141,7 @@ SeparationRun measure_separation(const Scene<float>& scene, std::uint32_t instan
   Playback<float> playback(scene);
   playback.seek(keyframes.front());
   PaperList paper(view, playback, build_topologies(view, playback, paper_builder), keyframes.front());
-  SeparationRun run;
-  run.scene = scene.name;
-  run.polygons = scene.primitive_count();
+  SeparationRun run{.scene = scene.name, .polygons = scene.primitive_count()};
 
   std::vector<double> stops = keyframes;
   const scenes::SeededNoise noise(13);
@@ -195,9 +193,7 @@ ListSizeRun measure_list_size(const Scene<float>& scene) {
   Playback<float> playback(scene);
   playback.seek(keyframes.front());
   PaperList paper(view, playback, build_topologies(view, playback, paper_builder), keyframes.front());
-  ListSizeRun run;
-  run.scene = scene.name;
-  run.polygons = scene.primitive_count();
+  ListSizeRun run{.scene = scene.name, .polygons = scene.primitive_count()};
   std::vector<WatchedPair> watched;
   for (const std::size_t k : {std::size_t(0), keyframes.size() / 2, keyframes.size() - 1}) {
     playback.seek(keyframes[k]);

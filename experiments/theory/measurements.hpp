@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "experiments/theory/envelope_report.hpp"
+
 /// The measurements of the checks as plain numbers: verdicts are functions of these alone.
 namespace kbvh::theory {
 
@@ -59,21 +61,13 @@ struct CurveRun {
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CurveRun, scene, triangles, vertices, segments, order, events, changes,
                                    bounds, pieces, over_lambda, most_changes, fullest, built)
 
-/// The same clip with the log of every change, checked against independently computed exact envelopes
-/// (envelope.hpp).
-struct ExactRun {
+/// The same clip with the log of every change, checked against independently computed exact envelopes; rows
+/// are the clip's segments.
+struct ExactRun : EnvelopeReport {
   std::string scene;
   std::uint64_t triangles = 0, vertices = 0, keyframes = 0;
-  std::string violation;                          ///< the first, empty if the log is right
-  std::uint64_t bounds = 0;                       ///< (node, side) pairs proved over the whole clip
-  std::uint64_t events = 0, logged = 0, net = 0;  ///< events; changes; net changes per bound and instant
-  std::uint64_t envelope = 0, canonical = 0;      ///< breakpoints; with ties resolved by smallest id
-  std::uint64_t several_steps = 0,
-                choices = 0;                  ///< ties: changes in addition to the net ones, equal successors
-  std::uint64_t momentary_events = 0;         ///< all their changes last for no time
-  std::uint64_t pieces = 0, over_lambda = 0;  ///< bounds x segments; with too many breakpoints
-  std::uint64_t most_breakpoints = 0;         ///< of one bound in one segment
-  double fullest = 0;                         ///< share of lambda_1(n) - 1, n >= 8
+  std::uint64_t events = 0;
+  std::uint64_t momentary_events = 0;               ///< all their changes last for no time
   std::uint64_t audited_instants = 0, audited = 0;  ///< between events and at keyframes; realisers compared
   std::uint64_t faults = 0;                         ///< of these, exceeded by a vertex
   std::uint64_t path_bounds = 0, path_faults = 0;   ///< on the paths touched by events, at their instants

@@ -136,11 +136,8 @@ class Runner {
 
   void family_at(const std::string& family, std::uint32_t size) {
     const std::string parameters = std::to_string(size) + "x" + std::to_string(options_->keyframes);
-    LazyScene scene([&] {
-      Scene<float> made = moving_scene(family, size, options_->keyframes);
-      made.name = family;
-      return made;
-    });
+    LazyScene scene([&] { return moving_scene(family, size, options_->keyframes); });
+    LazyScene colliding([&] { return colliding_scene(family, size, options_->keyframes); });
     report_.counts.push_back(
         get<CountRun>("counts", family, parameters, [&] { return measure_counts(scene()); }));
     if (size <= options_->boxtree_limit) boxtree(family, parameters, scene, size == exact_size());
@@ -148,8 +145,8 @@ class Runner {
       exact_.push_back(get<ExactRun>("exact envelopes", family,
                                      parameters + "+" + std::to_string(options_->instants),
                                      [&] { return measure_exact(scene(), options_->instants); }));
-    if (size <= options_->list_limit) separation(family, size, parameters);
-    if (chosen(size, 500)) proposals(family, size, parameters);
+    if (size <= options_->list_limit) separation(family, size, parameters, colliding);
+    if (chosen(size, 500)) proposals(family, size, parameters, colliding);
     if (chosen(size, 250)) plan_changes(family, parameters, scene);
     if (!chosen(size, 500)) return;
     const auto frames =
@@ -166,14 +163,10 @@ class Runner {
       for (const std::uint32_t keyframes : {2U, options_->keyframes}) {
         const std::string parameters = std::to_string(size) + "x" + std::to_string(keyframes);
         curves_.push_back(get<CurveRun>("curves", family, parameters, [&] {
-          Scene<float> scene = moving_scene(family, size, keyframes);
-          scene.name = family;
-          return measure_curves(scene);
+          return measure_curves(moving_scene(family, size, keyframes));
         }));
         motions_.push_back(get<MotionRun>("motion", family, parameters, [&] {
-          Scene<float> scene = colliding_scene(family, size, keyframes);
-          scene.name = family;
-          return measure_motion(scene);
+          return measure_motion(colliding_scene(family, size, keyframes));
         }));
       }
     }
@@ -193,12 +186,8 @@ class Runner {
     }));
   }
 
-  void separation(const std::string& family, std::uint32_t size, const std::string& parameters) {
-    LazyScene scene([&] {
-      Scene<float> made = colliding_scene(family, size, options_->keyframes);
-      made.name = family;
-      return made;
-    });
+  void separation(const std::string& family, std::uint32_t size, const std::string& parameters,
+                  LazyScene& scene) {
     list_sizes_.push_back(
         get<ListSizeRun>("list size", family, parameters, [&] { return measure_list_size(scene()); }));
     if (chosen(size, options_->separation_size))
@@ -208,12 +197,8 @@ class Runner {
   }
 
   /// What the paper proposes in its last section.
-  void proposals(const std::string& family, std::uint32_t size, const std::string& parameters) {
-    LazyScene scene([&] {
-      Scene<float> made = colliding_scene(family, size, options_->keyframes);
-      made.name = family;
-      return made;
-    });
+  void proposals(const std::string& family, std::uint32_t size, const std::string& parameters,
+                 LazyScene& scene) {
     for (const std::uint32_t width : {2U, 4U, 8U})
       orders_.push_back(get<OrderRun>("order " + std::to_string(width), family, parameters,
                                       [&] { return measure_order(scene(), width); }));
@@ -222,9 +207,7 @@ class Runner {
                                           [&] { return measure_rebuild(scene(), rebuild); }));
     const std::uint32_t small = std::min<std::uint32_t>(size, options_->separation_size);
     sweeps_.push_back(get<SweepRun>("sweeps of " + std::to_string(small), family, parameters, [&] {
-      Scene<float> made = colliding_scene(family, small, options_->keyframes);
-      made.name = family;
-      return measure_sweeps(made);
+      return measure_sweeps(colliding_scene(family, small, options_->keyframes));
     }));
   }
 

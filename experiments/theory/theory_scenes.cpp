@@ -27,6 +27,15 @@ Scene<float> scene_of(const io::AnimatedMesh& mesh) {
   return experiments::assemble<float>(loaded);
 }
 
+experiments::SceneSpec builtin_spec(const std::string& family, std::uint32_t triangles,
+                                    std::uint32_t keyframes) {
+  experiments::SceneSpec spec;
+  spec.builtin = spec.name = family;
+  spec.options.triangles = triangles;
+  spec.options.keyframes = keyframes;
+  return spec;
+}
+
 io::AnimatedMesh sphere(std::uint32_t triangles) {
   // Multiples of 2^-12: steps of 2^-6 stay on the lattice, and within float's 24 bits, below 2^12.
   return scenes::snapped(scenes::icosphere(triangles, {0, 0, 0}, 1.0), 12);
@@ -34,26 +43,19 @@ io::AnimatedMesh sphere(std::uint32_t triangles) {
 
 }  // namespace
 
-Scene<float> moving_scene(const std::string& family, std::uint32_t triangles, std::uint32_t keyframes,
-                          const experiments::MakeProgress& progress) {
-  experiments::SceneSpec spec;
-  spec.builtin = family;
-  spec.options.triangles = triangles;
-  spec.options.keyframes = keyframes;
+Scene<float> moving_scene(const std::string& family, std::uint32_t triangles, std::uint32_t keyframes) {
+  experiments::SceneSpec spec = builtin_spec(family, triangles, keyframes);
   // Bodies at rest are left out, so they get as few triangles as possible; except for clouds, which come in
   // pairs.
   if (family != "random_soups" && family != "passing_spheres") spec.options.obstacle_triangles = 20;
   // The cloth's motion depends on its table, which keeps its usual number of triangles.
   if (family == "tablecloth") spec.options.obstacle_triangles = 0;
-  experiments::find_builtin_scene(family);
-  return only_moving(experiments::assemble<float>(experiments::load(spec, progress)));
+  return only_moving(experiments::assemble<float>(experiments::load(spec)));
 }
 
 Scene<float> colliding_scene(const std::string& family, std::uint32_t triangles, std::uint32_t keyframes) {
-  experiments::SceneSpec spec;
-  spec.builtin = family;
-  spec.options.triangles = spec.options.obstacle_triangles = triangles;
-  spec.options.keyframes = keyframes;
+  experiments::SceneSpec spec = builtin_spec(family, triangles, keyframes);
+  spec.options.obstacle_triangles = triangles;
   return experiments::assemble<float>(experiments::load(spec));
 }
 

@@ -5,15 +5,15 @@
 
 #include "core/judge/session.hpp"
 #include "core/scene/scene.hpp"
-#include "experiments/scenes/builtin_scenes.hpp"
 
 namespace kbvh::theory {
 
-/// Returns the moving bodies of a built-in scene: resting bodies have no events. Throws io::InputError.
-Scene<float> moving_scene(const std::string& family, std::uint32_t triangles, std::uint32_t keyframes,
-                          const experiments::MakeProgress& progress = {});
+/// Returns the moving bodies of a built-in scene: resting bodies have no events. The scene is called like the
+/// family. Throws io::InputError.
+Scene<float> moving_scene(const std::string& family, std::uint32_t triangles, std::uint32_t keyframes);
 
-/// Returns a whole built-in scene, with as many triangles in the body next to the moving one.
+/// Returns a whole built-in scene, with as many triangles in the body next to the moving one. The scene is
+/// called like the family.
 Scene<float> colliding_scene(const std::string& family, std::uint32_t triangles, std::uint32_t keyframes);
 
 /// Returns a sequence of the data folder, with at most this many keyframes (0: all); nothing if it does not

@@ -51,7 +51,7 @@ class TestPaper(unittest.TestCase):
         self.assertEqual([one.brief for one in found.verdicts[:2]], ["E1 there.", "E2 here."])
         self.assertEqual([one.row.id for one in found.verdicts if one.differs], ["E2"])
         self.assertEqual(found.tally, [(claims.HOLDS, 1, 1), (claims.CONDITION, 0, 1), (claims.FAILS, 0, 0), (claims.OPEN, 1, 0)])
-        says = summary.on_the_paper(found)
+        says = " ".join(summary.parts_on_the_paper(found))
         for words in ("Of its 4 claims 2 hold, 1 hold with a condition, 0 do not hold and 1 are open", "1 decided by this study and 2 by the "
                       "reference run that comes with the project (Some CPU, 2026-01-02, commit 01234567)", "judges E2 otherwise",
                       "The claim “Claim E3” (E3) holds with a condition, by the reference run."):  # fmt: skip
@@ -98,8 +98,8 @@ class TestPaper(unittest.TestCase):
 
     def test_without_a_reference_run_only_this_study_speaks(self) -> None:
         (self.reference / "claims.json").unlink()
-        self.assertIn("decide none", summary.on_the_paper(self.paper(row("E1", claims.OPEN))))
-        says = summary.on_the_paper(self.paper(row("E1", claims.HOLDS)))
+        self.assertIn("decide none", " ".join(summary.parts_on_the_paper(self.paper(row("E1", claims.OPEN)))))
+        says = " ".join(summary.parts_on_the_paper(self.paper(row("E1", claims.HOLDS))))
         self.assertIn("1 decided by this study.", says)
         self.assertNotIn("reference", says)
 

@@ -79,11 +79,8 @@ TEST_P(Changes, OfOwnMaking) {
 }
 
 std::vector<std::pair<std::string, std::string>> scenes_with_contestants() {
-  std::vector<std::string> names = synthetic_scene_names();
-  names.insert(names.end(), geometry_scene_names().begin(), geometry_scene_names().end());
-  names.insert(names.end(), self_scene_names().begin(), self_scene_names().end());
   std::vector<std::pair<std::string, std::string>> cases;
-  for (const std::string& scene : names) {
+  for (const std::string& scene : all_synthetic_names()) {
     const auto in_float = synthetic_scene<float>(scene);
     const auto in_double = synthetic_scene<double>(scene);
     for (const StrategyEntry& entry : registry())

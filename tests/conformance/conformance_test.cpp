@@ -27,9 +27,7 @@ void expect_conforms(const std::string& violation, const std::string& where) {
 }
 
 std::vector<std::string> all_scene_names() {
-  std::vector<std::string> names = synthetic_scene_names();
-  names.insert(names.end(), geometry_scene_names().begin(), geometry_scene_names().end());
-  names.insert(names.end(), self_scene_names().begin(), self_scene_names().end());
+  std::vector<std::string> names = all_synthetic_names();
   names.insert(names.end(), curved_scene_names().begin(), curved_scene_names().end());
   return names;
 }

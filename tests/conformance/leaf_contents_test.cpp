@@ -243,10 +243,7 @@ StrategyEntry entry() {
 }
 
 TEST(LeafContents, SortedAtEveryFrameKeepEveryGuarantee) {
-  std::vector<std::string> names = synthetic_scene_names();
-  names.insert(names.end(), geometry_scene_names().begin(), geometry_scene_names().end());
-  names.insert(names.end(), self_scene_names().begin(), self_scene_names().end());
-  for (const std::string& name : names)
+  for (const std::string& name : all_synthetic_names())
     for (const std::uint32_t leaf : {1u, 4u}) {
       const BuilderConfig builder{
           .method = leaf == 1 ? BuildMethod::sah : BuildMethod::median, .width = 8, .leaf_size = leaf};

@@ -22,7 +22,6 @@ namespace {
 
 using broad_phase::Mesh;
 using broad_phase::moved_outward;
-using broad_phase::Rational;
 
 template <class S>
 class Radius : public testing::Test {};

@@ -12,13 +12,6 @@
 namespace kbvh::test::rays_test {
 namespace {
 
-std::vector<std::string> all_scenes() {
-  std::vector<std::string> names = synthetic_scene_names();
-  names.insert(names.end(), geometry_scene_names().begin(), geometry_scene_names().end());
-  names.insert(names.end(), self_scene_names().begin(), self_scene_names().end());
-  return names;
-}
-
 class Rays : public testing::TestWithParam<std::string> {};
 
 TEST_P(Rays, MeetWhatEveryPrimitiveSays) {
@@ -37,7 +30,7 @@ TEST_P(Rays, MeetWhatEveryPrimitiveSays) {
   if (in_both_scalars()) run(synthetic_scene<double>(GetParam()));
 }
 
-INSTANTIATE_TEST_SUITE_P(Scenes, Rays, testing::ValuesIn(all_scenes()),
+INSTANTIATE_TEST_SUITE_P(Scenes, Rays, testing::ValuesIn(all_synthetic_names()),
                          [](const auto& test) { return test.param; });
 
 // The other paths: every set of kernels, width and leaf size, lazy work of every kind, kinds of volumes.

@@ -37,10 +37,7 @@ class Restructuring : public testing::TestWithParam<std::size_t> {};
 TEST_P(Restructuring, AsOftenAsPossibleKeepsEveryGuarantee) {
   const Eager& one = eager()[GetParam()];
   const StrategyEntry& entry = find_strategy(one.id);
-  std::vector<std::string> names = synthetic_scene_names();
-  names.insert(names.end(), geometry_scene_names().begin(), geometry_scene_names().end());
-  names.insert(names.end(), self_scene_names().begin(), self_scene_names().end());
-  for (const std::string& name : names)
+  for (const std::string& name : all_synthetic_names())
     for (const std::uint32_t leaf : {1u, 4u}) {
       const BuilderConfig builder{
           .method = leaf == 1 ? BuildMethod::sah : BuildMethod::median, .width = 8, .leaf_size = leaf};

@@ -16,13 +16,6 @@
 namespace kbvh::test::volumes_test {
 namespace {
 
-std::vector<std::string> every_scene() {
-  std::vector<std::string> names = synthetic_scene_names();
-  names.insert(names.end(), geometry_scene_names().begin(), geometry_scene_names().end());
-  names.insert(names.end(), self_scene_names().begin(), self_scene_names().end());
-  return names;
-}
-
 /// Returns the violations in both scalars; nothing if there are none, or if the scene is unsuitable.
 std::string violations(const StrategyEntry& entry, const std::string& scene, std::uint32_t l,
                        const std::map<std::string, std::string>& params) {
@@ -47,7 +40,7 @@ TEST_P(EveryVolume, ConformsOnEveryScene) {
 
 INSTANTIATE_TEST_SUITE_P(Registry, EveryVolume,
                          testing::Combine(testing::ValuesIn(volume_words()),
-                                          testing::ValuesIn(every_scene())),
+                                          testing::ValuesIn(all_synthetic_names())),
                          [](const auto& test) {
                            return std::get<0>(test.param) + "_on_" + std::get<1>(test.param);
                          });
@@ -171,7 +164,7 @@ TEST_P(Rotations, AtEveryFrameKeepEveryGuarantee) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Synthetic, Rotations, testing::ValuesIn(every_scene()),
+INSTANTIATE_TEST_SUITE_P(Synthetic, Rotations, testing::ValuesIn(all_synthetic_names()),
                          [](const auto& test) { return test.param; });
 
 TEST(Rotations, AreTakenBackByReset) {

@@ -98,13 +98,6 @@ StrategyEntry restructuring() {
   return make_entry<T>(std::move(info));
 }
 
-std::vector<std::string> every_scene() {
-  std::vector<std::string> names = synthetic_scene_names();
-  names.insert(names.end(), geometry_scene_names().begin(), geometry_scene_names().end());
-  names.insert(names.end(), self_scene_names().begin(), self_scene_names().end());
-  return names;
-}
-
 class WideRotations : public testing::TestWithParam<std::string> {};
 
 TEST_P(WideRotations, AtEveryFrameKeepEveryGuarantee) {
@@ -123,7 +116,7 @@ TEST_P(WideRotations, AtEveryFrameKeepEveryGuarantee) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Synthetic, WideRotations, testing::ValuesIn(every_scene()),
+INSTANTIATE_TEST_SUITE_P(Synthetic, WideRotations, testing::ValuesIn(all_synthetic_names()),
                          [](const auto& test) { return test.param; });
 
 TEST(WideRotation, WithoutNewBoxesIsSeen) {

@@ -11,13 +11,6 @@
 namespace kbvh::test::within_test {
 namespace {
 
-std::vector<std::string> all_scenes() {
-  std::vector<std::string> names = synthetic_scene_names();
-  names.insert(names.end(), geometry_scene_names().begin(), geometry_scene_names().end());
-  names.insert(names.end(), self_scene_names().begin(), self_scene_names().end());
-  return names;
-}
-
 class Within : public testing::TestWithParam<std::string> {};
 
 TEST_P(Within, IsWhatEveryPrimitiveSays) {
@@ -36,7 +29,7 @@ TEST_P(Within, IsWhatEveryPrimitiveSays) {
   if (in_both_scalars()) run(synthetic_scene<double>(GetParam()));
 }
 
-INSTANTIATE_TEST_SUITE_P(Scenes, Within, testing::ValuesIn(all_scenes()),
+INSTANTIATE_TEST_SUITE_P(Scenes, Within, testing::ValuesIn(all_synthetic_names()),
                          [](const auto& test) { return test.param; });
 
 // The other paths: widths, leaf sizes, lazy work of every kind, kinds of volumes.

@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <array>
 #include <boost/multiprecision/gmp.hpp>
 #include <vector>
@@ -16,6 +17,16 @@ using RationalPoint = std::array<Rational, 3>;
 /// A finite number, exactly.
 inline Rational exact(double x) {
   return Rational(x);
+}
+
+inline RationalPoint minus(const RationalPoint& a, const RationalPoint& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+inline Rational dot(const RationalPoint& a, const RationalPoint& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+inline RationalPoint cross(const RationalPoint& a, const RationalPoint& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
 /// Returns the position of a piece at one of its times.
@@ -66,12 +77,6 @@ class RationalTriangles {
   }
 
  private:
-  static RationalPoint minus(const RationalPoint& a, const RationalPoint& b) {
-    return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-  }
-  static RationalPoint cross(const RationalPoint& a, const RationalPoint& b) {
-    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-  }
   static bool is_zero(const RationalPoint& a) { return a[0] == 0 && a[1] == 0 && a[2] == 0; }
   static std::array<RationalPoint, 3> edges(const RationalPoint* p) {
     return {minus(p[1], p[0]), minus(p[2], p[1]), minus(p[0], p[2])};
@@ -80,8 +85,8 @@ class RationalTriangles {
     if (is_zero(direction)) return false;
     std::array<Rational, 3> along[2];
     for (std::size_t i = 0; i < 3; ++i) {
-      along[0][i] = direction[0] * a[i][0] + direction[1] * a[i][1] + direction[2] * a[i][2];
-      along[1][i] = direction[0] * b[i][0] + direction[1] * b[i][1] + direction[2] * b[i][2];
+      along[0][i] = dot(direction, a[i]);
+      along[1][i] = dot(direction, b[i]);
     }
     const auto [low_a, high_a] = std::minmax_element(along[0].begin(), along[0].end());
     const auto [low_b, high_b] = std::minmax_element(along[1].begin(), along[1].end());

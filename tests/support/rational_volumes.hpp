@@ -18,12 +18,6 @@ namespace kbvh::test {
 
 // Membership from the definitions, in rationals.
 
-inline Rational dot(const RationalPoint& a, const RationalPoint& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-inline RationalPoint minus(const RationalPoint& a, const RationalPoint& b) {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
 template <class T>
 RationalPoint rational(const T* p) {
   return {exact(double(p[0])), exact(double(p[1])), exact(double(p[2]))};
@@ -61,9 +55,6 @@ bool contains(const Obb<S>& box, const RationalPoint& p) {
   return true;
 }
 
-inline RationalPoint cross(const RationalPoint& a, const RationalPoint& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
 inline RationalPoint times(const Rational& factor, const RationalPoint& p) {
   return {factor * p[0], factor * p[1], factor * p[2]};
 }

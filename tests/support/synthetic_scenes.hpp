@@ -26,6 +26,9 @@ const std::vector<std::string>& geometry_scene_names();
 /// Scenes that ask for pairs within bodies, too; some of these change plans, or geometry.
 const std::vector<std::string>& self_scene_names();
 
+/// Returns the names of all three lists, in this order.
+std::vector<std::string> all_synthetic_names();
+
 /// Returns those of the first list in which a gap of 0.1 between two sheets lies among numbers whose half
 /// unit of rounding is 0.005: far from the origin, or because of one vertex or triangle of the same body.
 const std::vector<std::string>& far_scene_names();

@@ -29,4 +29,11 @@ World world_of(const Scene<S>& scene) {
   return world;
 }
 
+/// Returns the positions of a horizontal triangle.
+inline std::vector<float> triangle_at(float z, bool padded = false) {
+  std::vector<float> positions{0, 0, z, 1, 0, z, 0, 1, z};
+  if (padded) positions.push_back(0);
+  return positions;
+}
+
 }  // namespace kbvh::test

@@ -40,18 +40,9 @@ Log<S> log_of(const Body<S>& body, const ExactMotion& motion, const BuilderConfi
                    active_kernel_set());
   const Topology& topology = hierarchy.topology();
   Log<S> log;
-  log.below.resize(topology.size());
+  log.below = vertices_below(topology, body.primitives);
   std::vector<std::uint32_t> node_of(hierarchy.node_count() * lane_scalars(topology.width), 0);
-  for (std::uint32_t node = topology.size(); node-- > 0;) {
-    auto& below = log.below[node];
-    const auto own = hierarchy.leaf_vertices(node);
-    below.insert(below.end(), own.begin(), own.end());
-    std::sort(below.begin(), below.end());
-    below.erase(std::unique(below.begin(), below.end()), below.end());
-    if (node != 0) {
-      auto& above = log.below[topology.parents[node]];
-      above.insert(above.end(), below.begin(), below.end());
-    }
+  for (std::uint32_t node = 0; node < topology.size(); ++node) {
     if (hierarchy.wide_parent(node) == WideHierarchy<S>::no_node) continue;
     for (std::uint32_t row = 0; row < 6; ++row) node_of[hierarchy.row_place(node, row)] = node;
   }

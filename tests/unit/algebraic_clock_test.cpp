@@ -16,6 +16,7 @@
 #include "tests/support/curved_scenes.hpp"
 #include "tests/support/rational_curves.hpp"
 #include "tests/support/seeded_clock.hpp"
+#include "tests/support/vertices_below.hpp"
 
 namespace kbvh::test::algebraic_clock_test {
 namespace {
@@ -41,29 +42,15 @@ class Play {
         forest_(view_, ClipMotion<S>(playback_),
                 at_start({.method = BuildMethod::median, .width = width, .leaf_size = leaf_size}), count_) {
     forest_.choose_queue(queue);
-    for (std::uint32_t body = 0; body < forest_.size(); ++body) {
-      const auto& tree = forest_.tree(body);
-      std::vector<std::vector<std::uint32_t>> below(tree.topology().size());
-      for (std::uint32_t node = tree.topology().size(); node-- > 0;) {
-        const auto leaf = tree.leaf_vertices(node);
-        below[node].insert(below[node].end(), leaf.begin(), leaf.end());
-        if (node == 0) continue;
-        auto& above = below[tree.topology().parents[node]];
-        above.insert(above.end(), below[node].begin(), below[node].end());
-      }
-      below_.push_back(std::move(below));
-    }
+    for (std::uint32_t body = 0; body < forest_.size(); ++body)
+      below_.push_back(vertices_below(forest_.tree(body)));
   }
 
   /// Plays the scene and checks at its frames and at `between` random times. Stops after so many
   /// events as a sound play has: faulty clocks may not come to an end.
   void run(int between, std::uint64_t seed, std::size_t most_events = 2000000) {
-    Random random(seed);
-    std::vector<double> times = frame_times(*scene_, 1);
-    const double first = times.front(), last = times.back();
-    for (int i = 0; i < between; ++i) times.push_back(first + (last - first) * (0.52 + 0.54 * random.unit()));
-    std::sort(times.begin(), times.end());
-    times.erase(std::unique(times.begin(), times.end()), times.end());
+    // Also a little before and after the clip.
+    const std::vector<double> times = frames_and_between(*scene_, between, seed, 0.52, 0.54);
     playback_.seek(times[0]);
     forest_.reset(times[0]);
     for (const double t : times) {
@@ -206,33 +193,12 @@ TEST(AlgebraicClock, SeededFaultsAreFound) {
   EXPECT_GT(found_faults<Fault::half_open>(), 0u);
 }
 
-/// One primitive over n vertices that move along x in one segment: one leaf, whose upper x side is the upper
-/// envelope of n curves.
-template <class S, class Make>
-Scene<S> one_leaf(std::uint32_t n, const Make& make) {
-  Scene<S> scene;
-  Body<S> body;
-  body.primitives.kind = PrimitiveKind::control_nets;
-  std::vector<std::uint32_t> all(n);
-  std::vector<S> positions(std::size_t(6) * n, S(0));
-  SegmentBends<S> bends{std::vector<S>(std::size_t(3) * n, S(0)), std::vector<S>(std::size_t(3) * n, S(0))};
-  for (std::uint32_t v = 0; v < n; ++v) {
-    all[v] = v;
-    const CurvedPiece<S> piece = make(v);
-    positions[3 * v] = piece.x0;
-    positions[3 * (n + v)] = piece.x1;
-    bends.bend[3 * v] = piece.bend;
-    bends.twist[3 * v] = piece.twist;
-  }
-  body.primitives.add(all);
-  body.plans = FlightPlans<S>(n, {0, 1}, std::move(positions), {bends});
-  scene.bodies.push_back(std::move(body));
-  return scene;
-}
-
-/// Returns the number of failures of the only node's certificate, by side.
+/// Returns the number of failures, by side, of the only node above vertices that move along x on these
+/// curves: the node's upper x side is the curves' upper envelope.
 template <class S>
-std::vector<std::size_t> failures_by_side(const Scene<S>& scene) {
+std::vector<std::size_t> failures_by_side(const std::vector<CurvedPiece<S>>& curves) {
+  Scene<S> scene;
+  scene.bodies.push_back(net_of_curves(curves));
   PlayOf<S> play(scene, 2, 1, "");
   play.run(20, 7);
   EXPECT_EQ(play.not_extremal(), 0u);
@@ -258,14 +224,11 @@ TEST(DavenportSchinzel, RandomCurvesStayBelowTheBound) {
     for (const std::uint32_t n : {2u, 5u, 20u, 60u}) {
       std::size_t most = 0;
       for (int round = 0; round < 6; ++round) {
-        const auto failures = failures_by_side(one_leaf<double>(n, [&](std::uint32_t) {
-          return CurvedPiece<double>{0,
-                                     1,
-                                     0.2 * random.unit(),
-                                     0.2 * random.unit(),
-                                     order > 1 ? random.unit() : 0,
-                                     order > 2 ? 3 * random.unit() : 0};
-        }));
+        std::vector<CurvedPiece<double>> curves;
+        for (std::uint32_t v = 0; v < n; ++v)
+          curves.push_back({0, 1, 0.2 * random.unit(), 0.2 * random.unit(), order > 1 ? random.unit() : 0,
+                            order > 2 ? 3 * random.unit() : 0});
+        const auto failures = failures_by_side(curves);
         for (const Side side : {0u, 1u}) {
           EXPECT_LE(failures[side] + 1, most_of_order(order, n)) << "order " << order << ", n = " << n;
           most = std::max(most, failures[side]);
@@ -276,14 +239,9 @@ TEST(DavenportSchinzel, RandomCurvesStayBelowTheBound) {
     }
 }
 
-// A line, and narrow parabolas that rise above it one after the other: 1 2 1 3 1 4 ... 1.
 TEST(DavenportSchinzel, ParabolasReachTheBoundOfOrderTwo) {
   for (const std::uint32_t n : {2u, 10u, 50u, 200u}) {
-    const auto failures = failures_by_side(one_leaf<double>(n, [&](std::uint32_t v) {
-      if (v == 0) return CurvedPiece<double>{};
-      const double gaps = n - 1, top = (v - 0.5) / gaps, height = 0.09 / (gaps * gaps);
-      return CurvedPiece<double>{0, 1, height - top * top, height - (1 - top) * (1 - top), 1, 0};
-    }));
+    const auto failures = failures_by_side(line_and_parabolas(n));
     EXPECT_EQ(failures[1] + 1, most_of_order(2, n)) << n;
     EXPECT_LE(failures[0] + 1, most_of_order(2, n)) << n;
   }
@@ -292,11 +250,8 @@ TEST(DavenportSchinzel, ParabolasReachTheBoundOfOrderTwo) {
 // Two cubics that meet three times, and a third that is behind: order 3 is reached for n = 2.
 TEST(DavenportSchinzel, TwoCubicsCrossThreeTimes) {
   // (s - 1/4) (s - 1/2) (s - 3/4) = s^3 - 3/2 s^2 + 11/16 s - 3/32
-  const auto failures = failures_by_side(one_leaf<float>(3, [](std::uint32_t v) {
-    if (v == 0) return CurvedPiece<float>{};
-    if (v == 2) return CurvedPiece<float>{0, 1, -1, -1, 0, 0};
-    return CurvedPiece<float>{0, 1, -3.0F / 32, 3.0F / 32, 0.5F, -1};
-  }));
+  const auto failures =
+      failures_by_side<float>({{}, {0, 1, -3.0F / 32, 3.0F / 32, 0.5F, -1}, {0, 1, -1, -1, 0, 0}});
   EXPECT_EQ(failures[1], 3u);
 }
 

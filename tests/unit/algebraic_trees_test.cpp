@@ -16,6 +16,7 @@
 #include "tests/support/curved_scenes.hpp"
 #include "tests/support/rational_curves.hpp"
 #include "tests/support/seeded_clock.hpp"
+#include "tests/support/vertices_below.hpp"
 
 namespace kbvh::test::algebraic_trees_test {
 namespace {
@@ -69,21 +70,8 @@ class Play {
                                  {.method = BuildMethod::median, .width = width, .leaf_size = leaf_size}),
                 count_) {
     forest_.choose_queue(queue);
-    for (std::uint32_t body = 0; body < forest_.size(); ++body) {
-      const auto& tree = forest_.tree(body);
-      const Topology& topology = tree.topology();
-      std::vector<std::vector<std::uint32_t>> below(topology.size());
-      for (std::uint32_t node = topology.size(); node-- > 0;) {
-        if (topology.nodes[node].is_leaf()) {
-          const auto leaf = tree.leaf_vertices(node);
-          below[node].assign(leaf.begin(), leaf.end());
-        }
-        if (node == 0) continue;
-        auto& above = below[topology.parents[node]];
-        above.insert(above.end(), below[node].begin(), below[node].end());
-      }
-      below_.push_back(std::move(below));
-    }
+    for (std::uint32_t body = 0; body < forest_.size(); ++body)
+      below_.push_back(vertices_below(forest_.tree(body)));
   }
 
   Forest& forest() { return forest_; }
@@ -91,12 +79,7 @@ class Play {
   /// Plays the scene and checks at its frames and at `between` random times. Stops after so many events as a
   /// sound play has: faulty trees may not come to an end.
   void run(int between, std::uint64_t seed, std::uint64_t most_events = 2000000) {
-    Random random(seed);
-    std::vector<double> times = frame_times(*scene_, 1);
-    const double first = times.front(), last = times.back();
-    for (int i = 0; i < between; ++i) times.push_back(first + (last - first) * (0.5 + 0.5 * random.unit()));
-    std::sort(times.begin(), times.end());
-    times.erase(std::unique(times.begin(), times.end()), times.end());
+    const std::vector<double> times = frames_and_between(*scene_, between, seed);
     playback_.seek(times[0]);
     forest_.reset(times[0]);
     for (const double t : times) {

@@ -3,7 +3,6 @@
 // rationals, distances in rationals.
 #include <algorithm>
 #include <array>
-#include <boost/multiprecision/gmp.hpp>
 #include <cmath>
 #include <exception>
 #include <limits>
@@ -13,11 +12,10 @@
 
 #include "core/broad_phase/broad_phase.hpp"
 #include "tests/support/random.hpp"
+#include "tests/support/rational_geometry.hpp"
 
 namespace kbvh::test::broad_phase {
 
-using Rational =
-    boost::multiprecision::number<boost::multiprecision::gmp_rational, boost::multiprecision::et_off>;
 using Pairs = std::set<Candidate>;
 
 /// A mesh with positions at one time or two, row by row.
@@ -141,16 +139,7 @@ Pairs brute_force(const Mesh<S>& mesh, CandidateKind kind, S radius) {
 
 // ---- Distances in rationals -------------------------------------------------------------------------------
 
-using Point = std::array<Rational, 3>;
-inline Point minus(const Point& a, const Point& b) {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
-inline Rational dot(const Point& a, const Point& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-inline Point cross(const Point& a, const Point& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
+using Point = RationalPoint;
 inline Point along(const Point& a, const Point& b, const Rational& t) {
   const Point d = minus(b, a);
   return {a[0] + t * d[0], a[1] + t * d[1], a[2] + t * d[2]};

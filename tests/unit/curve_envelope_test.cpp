@@ -13,6 +13,7 @@
 #include "core/topology/builders.hpp"
 #include "tests/support/curved_scenes.hpp"
 #include "tests/support/rational_curves.hpp"
+#include "tests/support/vertices_below.hpp"
 
 namespace kbvh::test::curve_envelope_test {
 namespace {
@@ -28,16 +29,8 @@ struct Sides {
                      active_kernel_set());
     const Topology& topology = hierarchy.topology();
     below.resize(hierarchy.node_count() * lane_scalars(topology.width));
-    std::vector<std::vector<std::uint32_t>> vertices(topology.size());
-    for (std::uint32_t node = topology.size(); node-- > 0;) {
-      const auto own = hierarchy.leaf_vertices(node);
-      vertices[node].insert(vertices[node].end(), own.begin(), own.end());
-      std::sort(vertices[node].begin(), vertices[node].end());
-      vertices[node].erase(std::unique(vertices[node].begin(), vertices[node].end()), vertices[node].end());
-      if (node != 0) {
-        auto& above = vertices[topology.parents[node]];
-        above.insert(above.end(), vertices[node].begin(), vertices[node].end());
-      }
+    const auto vertices = vertices_below(hierarchy);
+    for (std::uint32_t node = 0; node < topology.size(); ++node) {
       if (hierarchy.wide_parent(node) == WideHierarchy<S>::no_node) continue;
       for (std::uint32_t row = 0; row < 6; ++row)
         for (const std::uint32_t vertex : vertices[node])
@@ -183,24 +176,9 @@ TEST(CurveEnvelope, RealisersAreExtremalAtAndBetweenFramesInDouble) {
 }
 
 /// Returns the number of stores of the upper x side of one box around vertices on these curves.
-std::size_t pieces_above(const std::vector<CurvedPiece<double>>& pieces) {
-  const std::size_t n = pieces.size();
-  Body<double> body;
-  body.primitives.kind = PrimitiveKind::control_nets;
-  std::vector<std::uint32_t> all(n);
-  std::vector<double> positions(6 * n, 0.0);
-  SegmentBends<double> bends{std::vector<double>(3 * n, 0.0), std::vector<double>(3 * n, 0.0)};
-  for (std::size_t v = 0; v < n; ++v) {
-    all[v] = std::uint32_t(v);
-    positions[3 * v] = pieces[v].x0;
-    positions[3 * (n + v)] = pieces[v].x1;
-    bends.bend[3 * v] = pieces[v].bend;
-    bends.twist[3 * v] = pieces[v].twist;
-  }
+std::size_t pieces_above(const std::vector<CurvedPiece<double>>& curves) {
   // Two leaves with the same vertices: the box of the root has no side of its own.
-  body.primitives.add(all);
-  body.primitives.add(all);
-  body.plans = FlightPlans<double>(std::uint32_t(n), {0, 1}, std::move(positions), {bends});
+  const Body<double> body = net_of_curves(curves, 2);
   Sides<double> sides(body, {.method = BuildMethod::median, .width = 2, .leaf_size = 1});
   CurveEnvelope<double> envelope;
   envelope.assign(sides.hierarchy);
@@ -214,16 +192,9 @@ std::size_t pieces_above(const std::vector<CurvedPiece<double>>& pieces) {
                                        [&](const auto& store) { return store.slot == slot; }));
 }
 
-// A line, and narrow parabolas that rise above it one after the other: 1 2 1 3 1 4 ... 1.
 TEST(CurveEnvelope, ParabolasReachTheBoundOfOrderTwo) {
-  for (const std::uint32_t n : {2u, 10u, 100u}) {
-    std::vector<CurvedPiece<double>> pieces(1);
-    for (std::uint32_t v = 1; v < n; ++v) {
-      const double gaps = n - 1, top = (v - 0.5) / gaps, height = 0.09 / (gaps * gaps);
-      pieces.push_back({0, 1, height - top * top, height - (1 - top) * (1 - top), 1, 0});
-    }
-    EXPECT_EQ(pieces_above(pieces), 2 * n - 1) << n;
-  }
+  for (const std::uint32_t n : {2u, 10u, 100u})
+    EXPECT_EQ(pieces_above(line_and_parabolas(n)), 2 * n - 1) << n;
 }
 
 TEST(CurveEnvelope, TwoCubicsCrossThreeTimes) {

@@ -65,11 +65,7 @@ class Play {
                    count_, look_ahead, queue) {}
 
   Findings run(int between, std::uint64_t seed, std::uint64_t most_events = 2000000) {
-    Random random(seed);
-    std::vector<double> times = frame_times(*scene_, 1);
-    const double first = times.front(), last = times.back();
-    for (int i = 0; i < between; ++i) times.push_back(first + (last - first) * (0.5 + 0.5 * random.unit()));
-    std::sort(times.begin(), times.end());
+    const std::vector<double> times = frames_and_between(*scene_, between, seed);
     playback_.seek(times[0]);
     collision_.reset(times[0]);
     for (const double t : times) {

@@ -11,6 +11,7 @@
 #include "core/scene/playback.hpp"
 #include "core/topology/builders.hpp"
 #include "tests/support/synthetic_scenes.hpp"
+#include "tests/support/vertices_below.hpp"
 
 namespace kbvh::test::exact_tight_test {
 namespace {
@@ -28,16 +29,9 @@ WideHierarchy<S> hierarchy_of(const Body<S>& body, const BuilderConfig& builder,
 template <class S>
 std::uint64_t wrong_sides(const WideHierarchy<S>& hierarchy, const WideRealisers& realisers,
                           const FlightPlans<S>& plans, double t) {
-  const Topology& topology = hierarchy.topology();
-  std::vector<std::vector<std::uint32_t>> below(topology.size());
+  const auto below = vertices_below(hierarchy);
   std::uint64_t wrong = 0;
-  for (std::uint32_t node = topology.size(); node-- > 0;) {
-    const auto own = hierarchy.leaf_vertices(node);
-    below[node].insert(below[node].end(), own.begin(), own.end());
-    if (node != 0) {
-      auto& above = below[topology.parents[node]];
-      above.insert(above.end(), below[node].begin(), below[node].end());
-    }
+  for (std::uint32_t node = 0; node < below.size(); ++node) {
     if (hierarchy.wide_parent(node) == WideHierarchy<S>::no_node) continue;
     for (std::uint32_t row = 0; row < 6; ++row) {
       const std::uint32_t place = realisers[hierarchy.row_place(node, row)];

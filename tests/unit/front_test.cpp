@@ -6,40 +6,17 @@
 
 #include "core/families/front/pair_front.hpp"
 #include "core/families/wide/near_bodies.hpp"
-#include "core/families/wide/wide_hierarchy.hpp"
-#include "core/topology/builders.hpp"
 #include "tests/support/moving_grids.hpp"
 #include "tests/support/synthetic_scenes.hpp"
+#include "tests/support/wide_bodies.hpp"
 
 namespace kbvh::test::front_test {
 namespace {
 
 /// The hierarchies of a scene, and one front for all pairs of bodies, as a strategy keeps it.
 template <class S>
-struct Bodies {
-  Bodies(const Scene<S>& of, const BuilderConfig& builder, KernelSet set)
-      : scene(of), view(scene), playback(scene), motion(playback), query(view, motion) {
-    Topologies topologies = initial_topologies(builder);
-    hierarchies.resize(scene.bodies.size());
-    for (std::uint32_t body = 0; body < scene.bodies.size(); ++body)
-      hierarchies[body].assign(std::move(topologies[body]), view.primitives(body), set);
-  }
-  Topologies initial_topologies(const BuilderConfig& builder) {
-    playback.evaluate_all();
-    Topologies topologies;
-    for (std::uint32_t body = 0; body < scene.bodies.size(); ++body)
-      topologies.push_back(build_topology(view.primitives(body), playback.positions(body), builder));
-    return topologies;
-  }
-  void seek(double t) {
-    playback.seek(t);
-    playback.evaluate_all();
-    for (std::uint32_t body = 0; body < hierarchies.size(); ++body) {
-      hierarchies[body].positions_changed();
-      hierarchies[body].refit(playback.positions(body));
-    }
-  }
-  WideSide<S> side(std::uint32_t body) { return {&hierarchies[body], body}; }
+struct Bodies : WideBodies<S> {
+  using WideBodies<S>::WideBodies;
 
   struct Answer {
     PairBuffer pairs{};
@@ -47,29 +24,22 @@ struct Bodies {
   };
   Answer traversed() {
     Answer answer;
-    for (const BodyPair& pair : scene.pairs)
-      query.run(side(pair.first), side(pair.second), answer.pairs, answer.tests);
-    std::sort(answer.pairs.begin(), answer.pairs.end());
+    answer.pairs = this->candidates(answer.tests);
     return answer;
   }
   Answer tracked(const Budget& budget = {}) {
     Answer answer;
     front.start_frame();
-    for (std::uint32_t i = 0; i < scene.pairs.size(); ++i)
+    const auto& pairs = this->scene.pairs;
+    for (std::uint32_t i = 0; i < pairs.size(); ++i)
       answer.pending += front
-                            .run(i, side(scene.pairs[i].first), side(scene.pairs[i].second), query,
+                            .run(i, this->side(pairs[i].first), this->side(pairs[i].second), this->query,
                                  answer.pairs, answer.tests, rest_of(budget, answer.tests))
                             .pending;
     std::sort(answer.pairs.begin(), answer.pairs.end());
     return answer;
   }
 
-  Scene<S> scene;
-  SceneView<S> view;
-  Playback<S> playback;
-  SampledMotion<S> motion;
-  WideQuery<S> query;
-  std::vector<WideHierarchy<S>> hierarchies;
   PairFront<S> front;
 };
 

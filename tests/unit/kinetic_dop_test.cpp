@@ -12,6 +12,7 @@
 #include "core/families/events/realiser_dops.hpp"
 #include "core/topology/builders.hpp"
 #include "tests/support/rational_volumes.hpp"
+#include "tests/support/vertices_below.hpp"
 
 namespace kbvh::test::kinetic_dop_test {
 namespace {
@@ -120,19 +121,6 @@ class Play {
     playback_.seek(0);
     playback_.evaluate_all();
     return build_topologies(view_, playback_, builder);
-  }
-  template <class Tree>
-  static std::vector<std::vector<std::uint32_t>> vertices_below(const Tree& tree) {
-    const Topology& topology = tree.topology();
-    std::vector<std::vector<std::uint32_t>> below(topology.size());
-    for (std::uint32_t node = topology.size(); node-- > 0;) {
-      const auto leaf = tree.leaf_vertices(node);
-      below[node].insert(below[node].end(), leaf.begin(), leaf.end());
-      if (node == 0) continue;
-      auto& above = below[topology.parents[node]];
-      above.insert(above.end(), below[node].begin(), below[node].end());
-    }
-    return below;
   }
   static Rational root_of(const Crossing<S>& crossing) {
     // Two lines, each by its values at two times.

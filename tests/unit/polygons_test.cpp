@@ -22,9 +22,9 @@
 namespace kbvh::polygons_test {
 namespace {
 
+using test::dot;
 using test::exact;
 using test::Random;
-using test::Rational;
 using Ids = std::vector<std::uint32_t>;
 using Triangle = std::array<std::uint32_t, 3>;
 using Points = std::vector<double>;  // [corner][3]
@@ -59,7 +59,7 @@ std::multiset<Triangle> triangles_of(const PolygonCut& cut) {
 }
 
 /// Twice the signed area of a list of corners, in the projection along a vector.
-using Vector = std::array<Rational, 3>;
+using Vector = test::RationalPoint;
 Vector area_vector(const Polygon& polygon, std::span<const std::uint32_t> ids) {
   Vector sum;
   for (std::size_t i = 0; i < ids.size(); ++i)
@@ -70,9 +70,6 @@ Vector area_vector(const Polygon& polygon, std::span<const std::uint32_t> ids) {
       sum[axis] += at(i, axis + 1) * at(i + 1, axis + 2) - at(i, axis + 2) * at(i + 1, axis + 1);
     }
   return sum;
-}
-Rational dot(const Vector& a, const Vector& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
 /// Checks that all triangles turn with the polygon. Their boundaries add up to that of the polygon, so a

@@ -7,69 +7,46 @@
 #include <cmath>
 
 #include "core/families/slabs/slab_query.hpp"
-#include "core/families/wide/wide_hierarchy.hpp"
-#include "core/topology/builders.hpp"
 #include "tests/support/play.hpp"
 #include "tests/support/synthetic_scenes.hpp"
+#include "tests/support/wide_bodies.hpp"
 #include "tests/unit/slab_scenes.hpp"
 
 namespace kbvh::test::slabs_test {
 namespace {
 
 template <class S>
-struct SlabbedBodies {
+struct SlabbedBodies : WideBodies<S> {
   SlabbedBodies(const Scene<S>& of, const BuilderConfig& builder, KernelSet set)
-      : scene(of), view(scene), playback(scene), motion(playback), boxes(view, motion), slabs(view) {
-    playback.evaluate_all();
-    hierarchies.resize(scene.bodies.size());
-    blocks.resize(scene.bodies.size());
-    for (std::uint32_t body = 0; body < scene.bodies.size(); ++body)
-      hierarchies[body].assign(build_topology(view.primitives(body), playback.positions(body), builder),
-                               view.primitives(body), set);
-  }
+      : WideBodies<S>(of, builder, set), slabs(this->view), blocks(of.bodies.size()) {}
   enum class Blocks : std::uint8_t { current, stale };
   void seek(double t, Blocks what = Blocks::current) {
-    playback.seek(t);
-    playback.evaluate_all();
-    for (std::uint32_t body = 0; body < hierarchies.size(); ++body) {
-      hierarchies[body].positions_changed();
-      hierarchies[body].refit(playback.positions(body));
-      if (what == Blocks::current) blocks[body].positions_changed();
-    }
+    WideBodies<S>::seek(t);
+    if (what == Blocks::stale) return;
+    for (SlabBlocks<S>& one : blocks) one.positions_changed();
   }
   PairBuffer by_boxes() {
-    PairBuffer pairs;
     std::uint64_t tests = 0;
-    for (const BodyPair& pair : scene.pairs)
-      boxes.run({&hierarchies[pair.first], pair.first}, {&hierarchies[pair.second], pair.second}, pairs,
-                tests);
-    std::sort(pairs.begin(), pairs.end());
-    return pairs;
+    return this->candidates(tests);
   }
-  typename SlabQuery<S>::Side side(std::uint32_t body) {
-    return {&hierarchies[body], body, &blocks[body], playback.positions(body)};
+  typename SlabQuery<S>::Side slab_side(std::uint32_t body) {
+    return {&this->hierarchies[body], body, &blocks[body], this->playback.positions(body)};
   }
   PairBuffer by_slabs(S rounding = SlabQuery<S>::enough_rounding) {
     PairBuffer pairs;
     std::uint64_t tests = 0;
-    for (const BodyPair& pair : scene.pairs)
-      slabs.run(side(pair.first), side(pair.second), pairs, tests, {}, rounding);
+    for (const BodyPair& pair : this->scene.pairs)
+      slabs.run(slab_side(pair.first), slab_side(pair.second), pairs, tests, {}, rounding);
     std::sort(pairs.begin(), pairs.end());
     return pairs;
   }
   PairBuffer confirmed(PairBuffer pairs) {
     TriangleTestStats stats;
-    confirm_pairs(view, motion, pairs, stats);
+    confirm_pairs(this->view, this->motion, pairs, stats);
     return pairs;
   }
 
-  Scene<S> scene;
-  SceneView<S> view;
-  Playback<S> playback;
-  SampledMotion<S> motion;
-  WideQuery<S> boxes;
   SlabQuery<S> slabs;
-  std::vector<WideHierarchy<S>> hierarchies;
   std::vector<SlabBlocks<S>> blocks;
 };
 

@@ -6,9 +6,8 @@
 
 #include <algorithm>
 
-#include "core/families/wide/wide_query.hpp"
-#include "core/topology/builders.hpp"
 #include "tests/support/polygon_soups.hpp"
+#include "tests/support/wide_bodies.hpp"
 
 namespace kbvh {
 namespace {
@@ -115,24 +114,12 @@ TEST(WideHierarchy, SetBoxIsWhatTheQueryReads) {
 }
 
 TEST(WideHierarchy, ABudgetLeavesWorkUndone) {
-  const Scene<float> scene = soups<float>(300, 6);
-  const SceneView<float> view(scene);
-  Playback<float> playback(scene);
-  playback.evaluate_all();
-  const SampledMotion<float> motion(playback);
-  WideHierarchy<float> hierarchies[2];
-  for (std::uint32_t body = 0; body < 2; ++body) {
-    const auto boxes = primitive_boxes(view.primitives(body), playback.positions(body));
-    hierarchies[body].assign(build_topology<float>(boxes, {.width = 2, .leaf_size = 1}),
-                             view.primitives(body), active_kernel_set());
-    hierarchies[body].refit(playback.positions(body));
-  }
-  WideQuery<float> query(view, motion);
+  test::WideBodies<float> bodies(soups<float>(300, 6), {.width = 2, .leaf_size = 1}, active_kernel_set());
+  bodies.seek(0);
   PairBuffer all, some;
   std::uint64_t tests = 0;
-  query.run({&hierarchies[0], 0}, {&hierarchies[1], 1}, all, tests);
-  const QueryStatus status =
-      query.run({&hierarchies[0], 0}, {&hierarchies[1], 1}, some, tests, Budget{tests / 2});
+  bodies.query.run(bodies.side(0), bodies.side(1), all, tests);
+  const QueryStatus status = bodies.query.run(bodies.side(0), bodies.side(1), some, tests, Budget{tests / 2});
   EXPECT_FALSE(status.complete());
   EXPECT_LT(some.size(), all.size());
 }
@@ -164,31 +151,13 @@ Scene<S> coincident(std::uint32_t count) {
 template <class S>
 void check_overflowing_buffers(std::uint32_t leaf_size) {
   const std::uint32_t count = 300;
-  const Scene<S> scene = coincident<S>(count);
-  const SceneView<S> view(scene);
-  Playback<S> playback(scene);
-  const SampledMotion<S> motion(playback);
-  playback.evaluate_all();
   for (const KernelSet set : supported_kernel_sets())
     for (const std::uint32_t width : {2u, 8u}) {
-      WideHierarchy<S> hierarchies[2];
-      for (std::uint32_t body = 0; body < 2; ++body) {
-        const auto boxes = primitive_boxes(view.primitives(body), playback.positions(body));
-        hierarchies[body].assign(build_topology<S>(boxes, {.width = width, .leaf_size = leaf_size}),
-                                 view.primitives(body), set);
-      }
-      WideQuery<S> query(view, motion);
+      test::WideBodies<S> bodies(coincident<S>(count), {.width = width, .leaf_size = leaf_size}, set);
       for (const double t : {0.0, 1.0, 0.0}) {
-        playback.seek(t);
-        playback.evaluate_all();
-        for (std::uint32_t body = 0; body < 2; ++body) {
-          hierarchies[body].positions_changed();
-          hierarchies[body].refit(playback.positions(body));
-        }
-        PairBuffer pairs;
+        bodies.seek(t);
         std::uint64_t tests = 0;
-        query.run({&hierarchies[0], 0}, {&hierarchies[1], 1}, pairs, tests);
-        std::sort(pairs.begin(), pairs.end());
+        const PairBuffer pairs = bodies.candidates(tests);
         EXPECT_EQ(std::adjacent_find(pairs.begin(), pairs.end()), pairs.end());
         EXPECT_EQ(pairs.size(), t == 0 ? std::size_t(count) * count : 0) << name(set) << ", width " << width;
       }
@@ -203,22 +172,11 @@ TEST(WideHierarchy, BuffersMayOverflowAndPositionsChange) {
 }
 
 TEST(WideHierarchy, AQueryRefusesUnlikeHierarchies) {
-  const Scene<float> scene = soups<float>(40, 8);
-  const SceneView<float> view(scene);
-  Playback<float> playback(scene);
-  playback.evaluate_all();
-  const SampledMotion<float> motion(playback);
-  WideHierarchy<float> hierarchies[2];
-  for (std::uint32_t body = 0; body < 2; ++body) {
-    const auto boxes = primitive_boxes(view.primitives(body), playback.positions(body));
-    hierarchies[body].assign(build_topology<float>(boxes, {.width = 8, .leaf_size = body == 0 ? 1u : 4u}),
-                             view.primitives(body), active_kernel_set());
-    hierarchies[body].refit(playback.positions(body));
-  }
-  WideQuery<float> query(view, motion);
-  PairBuffer pairs;
+  test::WideBodies<float> bodies(soups<float>(40, 8), {.width = 8, .leaf_size = 1}, active_kernel_set());
+  bodies.build(1, {.width = 8, .leaf_size = 4}, active_kernel_set());
+  bodies.seek(0);
   std::uint64_t tests = 0;
-  EXPECT_THROW(query.run({&hierarchies[0], 0}, {&hierarchies[1], 1}, pairs, tests), std::invalid_argument);
+  EXPECT_THROW(bodies.candidates(tests), std::invalid_argument);
 }
 
 TEST(WideHierarchy, SubtreesAndWhatIsAboveMakeAllBoxes) {

@@ -16,11 +16,6 @@ namespace kbvh::test::world_judgement_test {
 namespace {
 
 const std::vector<std::uint32_t> triangle{0, 1, 2};
-std::vector<float> triangle_at(float z, bool padded = false) {
-  std::vector<float> positions{0, 0, z, 1, 0, z, 0, 1, z};
-  if (padded) positions.push_back(0);
-  return positions;
-}
 
 // Judgement through the façade is that of the judge: a sound strategy holds, and a faulty answer is counted.
 template <class S>

@@ -146,11 +146,6 @@ TEST(World, TellsWhatBeganAndEnded) {
 }
 
 const std::vector<std::uint32_t> triangle{0, 1, 2};
-std::vector<float> triangle_at(float z, bool padded = false) {
-  std::vector<float> positions{0, 0, z, 1, 0, z, 0, 1, z};
-  if (padded) positions.push_back(0);
-  return positions;
-}
 
 template <class S>
 void expect_the_same_hits(const char* id) {

@@ -5,6 +5,7 @@
 
 #include "core/contract/strategy.hpp"
 #include "core/families/blend/blend_source.hpp"
+#include "core/families/wide/count_boxes.hpp"
 #include "core/families/wide/lazy_query.hpp"
 #include "core/families/wide/near_bodies.hpp"
 #include "core/families/wide/rows_on_demand.hpp"
@@ -181,22 +182,15 @@ class BlendedStrategy : public CountedStrategy<S>, public AnswersProbes<S>, publ
     this->sampled_.fetch_all(index);
     refitted.refit(this->sampled_.positions(index));
     bodies_[index].rows.refitted();
-    const std::uint64_t nodes = refitted.topology().size();
-    this->count_.add(Counter::nodes_visited, nodes);
-    this->count_.add(Counter::values_written, 6 * nodes);
-    this->count_.add(Counter::vertex_reads, refitted.leaf_vertex_count());
+    count_boxes(this->count_, refitted.topology().size(), refitted.leaf_vertex_count());
   }
   void make_visited() {
     for (Body& body : bodies_)
-      if (body.known == Known::blended) count_boxes(body.rows.make_visited(body.blend));
+      if (body.known == Known::blended) count_boxes(this->count_, body.rows.make_visited(body.blend), 0);
   }
   void make_wanted(std::uint32_t index, std::uint32_t node) {
     Body& body = bodies_[index];
-    count_boxes(body.rows.make_wanted(node, body.blend));
-  }
-  void count_boxes(std::uint64_t boxes) {
-    this->count_.add(Counter::nodes_visited, boxes);
-    this->count_.add(Counter::values_written, 6 * boxes);
+    count_boxes(this->count_, body.rows.make_wanted(node, body.blend), 0);
   }
   WideSide<S> lazy_side(std::uint32_t body) {
     return {.hierarchy = &hierarchy(body), .body = body, .stale = bodies_[body].rows.stale()};

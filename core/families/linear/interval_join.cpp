@@ -17,7 +17,6 @@ void IntervalJoin<S>::start(const LinearSegment<S>& segment, const SceneView<S>&
   found_.clear();
   leaf_pairs_room_ = leaf_pairs;
   node_tests_ = 0;
-  leaf_pairs_seen_ = 0;
   reading_ = indexed_ = has_beginning_ = false;
   following_ = {};
   throughout_ = count_ = 0;
@@ -134,7 +133,6 @@ template <class S>
 void IntervalJoin<S>::take_leaves(std::size_t end, LeavesOf leaves) {
   leaf_join_.count = end;
   leaf_join_.masks = nullptr;
-  leaf_pairs_seen_ += end - leaf_join_.next;
   if (with_slabs_ && leaves == LeavesOf::two) {
     leaf_join_.count = filter_leaves(end);
     leaf_join_.masks = masks_.data();

@@ -63,8 +63,6 @@ class IntervalJoin {
   /// From now on leaves out pairs of triangles that the slab of a leaf separates throughout the segment
   /// (SlabSpanPairs); all bodies must consist of triangles only.
   void use_slabs() { with_slabs_ = true; }
-  /// Returns the number of pairs of leaves whose boxes overlap within the segment.
-  std::uint64_t leaf_pairs() const { return leaf_pairs_seen_; }
 
   /// Appends the pairs whose boxes overlap at a fraction of the segment. Fractions must not decrease within a
   /// segment. O(pairs that begin or end since the last call), plus one copy of the overlapping pairs.
@@ -160,7 +158,6 @@ class IntervalJoin {
   bool with_neighbours_ = false, with_slabs_ = false, done_ = true;
   SlabSpanPairs<S> slabs_{};          ///< of the current pair of bodies
   std::vector<std::uint32_t> masks_;  ///< [pair of leaves]
-  std::uint64_t leaf_pairs_seen_ = 0;
   WideTraversal traversal_{};
   WideLeafJoin<S> leaf_join_{};
   typename WideLinearKernels<S>::Join traverse_ = nullptr;

@@ -68,7 +68,6 @@ class SharedFront {
       for (std::size_t i = cut.begin(part); i < cut.end(part); ++i) traverse_item(items_[i], r, step, take);
     });
     std::uint64_t tests = expansion_tests_;
-    most_tests_ = 0;
     std::size_t all = 0, deepest = 0;
     for (const Runner& runner : runners_) {
       all += runner.found.size();
@@ -79,18 +78,13 @@ class SharedFront {
       runner.found.reserve(all);
       runner.stack.resize(deepest);
     }
-    for (const Runner& runner : runners_) {
-      tests += runner.tests;
-      most_tests_ = std::max(most_tests_, runner.tests);
-    }
+    for (const Runner& runner : runners_) tests += runner.tests;
     cut_batches();
     return tests;
   }
 
   /// Returns the found pairs of leaves, in the order of the traversals. Valid until the next `start`.
   std::span<const Batch> batches() const { return batches_; }
-  /// Returns the box tests of the thread that made most of them.
-  std::uint64_t most_tests() const { return most_tests_; }
 
   std::size_t bytes() const {
     std::size_t total = (items_.capacity() + next_.capacity()) * sizeof(Item) +
@@ -192,7 +186,7 @@ class SharedFront {
   std::vector<LeafSlot> found_;  ///< by `expand`
   std::vector<Runner> runners_;
   std::vector<Batch> batches_;
-  std::uint64_t expansion_tests_ = 0, most_tests_ = 0;
+  std::uint64_t expansion_tests_ = 0;
 };
 
 }  // namespace kbvh

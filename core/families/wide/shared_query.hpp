@@ -32,10 +32,6 @@ class SharedQuery {
   }
   /// Appends the pairs of primitives of all added bodies; adds the box tests made to `tests`.
   void run(Workers& workers, PairBuffer& out, std::uint64_t& tests);
-
-  /// Returns the largest number of box tests of inner nodes that one thread made in the last query, which
-  /// shows how balanced it was.
-  std::uint64_t most_tests() const { return front_.most_tests(); }
   std::size_t bytes() const;
 
  private:

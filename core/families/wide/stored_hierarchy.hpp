@@ -4,6 +4,7 @@
 
 #include "core/contract/reports_work.hpp"
 #include "core/contract/strategy.hpp"
+#include "core/families/wide/count_boxes.hpp"
 #include "core/families/wide/near_bodies.hpp"
 #include "core/families/wide/surface_sums.hpp"
 #include "core/families/wide/swept_hierarchies.hpp"
@@ -134,12 +135,8 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S>, public AnswersPro
       swept_.emplace(
           this->scene_, [&](std::uint32_t body) -> const auto& { return hierarchies_[body]; });
     swept_->refit(before, this->sampled_);
-    for (std::uint32_t body = 0; body < hierarchies_.size(); ++body) {
-      const std::uint64_t nodes = hierarchies_[body].topology().size();
-      this->count_.add(Counter::nodes_visited, nodes);
-      this->count_.add(Counter::values_written, 6 * nodes);
-      this->count_.add(Counter::vertex_reads, 2 * hierarchies_[body].leaf_vertex_count());
-    }
+    for (const auto& hierarchy : hierarchies_)
+      count_boxes(this->count_, hierarchy.topology().size(), 2 * hierarchy.leaf_vertex_count());
     std::uint64_t tests = 0;
     swept_->pairs(query_, out, tests);
     this->count_.add(Counter::box_tests, tests);
@@ -158,10 +155,7 @@ class FixedPlansHierarchyStrategy : public CountedStrategy<S>, public AnswersPro
   void refit(std::uint32_t body) { hierarchies_[body].refit(this->sampled_.positions(body)); }
   /// Adds the work of one whole refit of a body to the counters.
   void count_refit(std::uint32_t body) {
-    const std::uint64_t nodes = hierarchies_[body].topology().size();
-    this->count_.add(Counter::nodes_visited, nodes);
-    this->count_.add(Counter::values_written, 6 * nodes);
-    this->count_.add(Counter::vertex_reads, hierarchies_[body].leaf_vertex_count());
+    count_boxes(this->count_, hierarchies_[body].topology().size(), hierarchies_[body].leaf_vertex_count());
   }
   void refit_counted(std::uint32_t body) {
     refit(body);
