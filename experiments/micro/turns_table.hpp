@@ -25,6 +25,13 @@ inline double milliseconds() {
   return 1e3 * double(std::clock()) / CLOCKS_PER_SEC;
 }
 
+/// Returns the median of at least one value, of an even number the mean of both in the middle. Sorts them.
+inline double median_of(std::vector<double>& values) {
+  std::sort(values.begin(), values.end());
+  const std::size_t half = values.size() / 2;
+  return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
+}
+
 /// Work that is timed by turns with its rivals.
 struct Contestant {
   std::string name;
@@ -43,10 +50,10 @@ class RatioTargets {
                   {"ratio", ratio},
                   {"at_least", at_least},
                   {"aim", aim},
-                  {"verdict", at_least == 0      ? "reported"
-                              : ratio < at_least ? "missed"
-                              : ratio < aim      ? "met"
-                                                 : "met, and the aim"}});
+                  {"verdict", at_least == 0       ? "reported"
+                              : ratio >= aim      ? "met, and the aim"
+                              : ratio >= at_least ? "met"
+                                                  : "missed"}});  // also where there is no ratio
     rows_.push_back(std::move(facts));
   }
   void print() const {
@@ -95,8 +102,7 @@ class Table {
     nlohmann::json rows = nlohmann::json::array();
     double first = 0;
     for (Contestant& contestant : contestants) {
-      std::sort(contestant.ms.begin(), contestant.ms.end());
-      const double median = contestant.ms[contestant.ms.size() / 2];
+      const double median = median_of(contestant.ms);
       if (first == 0) first = median;
       medians_[contestant.name] = median;
       std::printf("  %-56s %10.3f ms  %7.2f x  %zu pairs\n", contestant.name.c_str(), median, median / first,
