@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import tempfile
 import unittest
-from pathlib import Path
 from typing import Optional
 
 import paths  # noqa: F401  (finds the modules under test)
+import shared
 import synthetic
 from test_claims import WORLD, Line, line
 
@@ -56,12 +55,7 @@ class TestPoints(unittest.TestCase):
         self.assertEqual(self.found([1, 10], [3, 1]).kind, MIXED)
 
 
-class TestStudies(unittest.TestCase):
-    def setUp(self) -> None:
-        temporary = tempfile.TemporaryDirectory(prefix="kbvh-analysis-")
-        self.addCleanup(temporary.cleanup)
-        self.folder = Path(temporary.name)
-
+class TestStudies(shared.InFolder):
     def lines(self, updates: dict[str, dict[int, float]], size: int = 16000) -> list[Line]:
         """Runs with given update times, and nothing else that takes time."""
         made = []

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import contextlib
 import copy
-import io
 import json
-import tempfile
 import unittest
 from pathlib import Path
 from typing import Any
 
 import paths  # noqa: F401  (finds the modules under test)
+import shared
 
 from report import broad_phase_table
 
@@ -26,19 +24,11 @@ RESULT: dict[str, Any] = {
 }  # fmt: skip
 
 
-class TestTable(unittest.TestCase):
-    def setUp(self) -> None:
-        made = tempfile.TemporaryDirectory(prefix="kbvh-analysis-")
-        self.addCleanup(made.cleanup)
-        self.folder = Path(made.name)
-
+class TestTable(shared.InFolder):
     def run_main(self, result: Any, *arguments: str) -> tuple[int, str, str]:
         file = self.folder / "bench.json"
         file.write_text(json.dumps(result), encoding="utf-8")
-        out, err = io.StringIO(), io.StringIO()
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-            code = broad_phase_table.main([str(file), *arguments])
-        return code, out.getvalue(), err.getvalue()
+        return shared.said(broad_phase_table.main, file, *arguments)
 
     def test_a_row_for_each_target(self) -> None:
         code, out, err = self.run_main(RESULT)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import copy
 import json
 import re
-import tempfile
 import unittest
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Optional
 
 import paths  # noqa: F401  (finds the modules under test)
+import shared
 import synthetic
 
 from claims import claims
@@ -127,12 +127,7 @@ CONTRADICTIONS: dict[str, Callable[[list[Line]], None]] = {
 }  # fmt: skip
 
 
-class ClaimsCase(unittest.TestCase):
-    def setUp(self) -> None:
-        temporary = tempfile.TemporaryDirectory(prefix="kbvh-analysis-")
-        self.addCleanup(temporary.cleanup)
-        self.folder = Path(temporary.name)
-
+class ClaimsCase(shared.InFolder):
     def rows(self, lines: list[Line]) -> dict[str, claims.Row]:
         synthetic.write(self.folder, lines)
         return {row.id: row for row in claims.evaluate(load.load(self.folder), self.folder).rows}

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 import json
 import os
 import re
@@ -11,12 +9,11 @@ import resource
 import signal
 import subprocess
 import sys
-import tempfile
 import unittest
-from pathlib import Path
 from typing import Any, Callable
 
 import paths
+import shared
 import synthetic
 
 from figures import scene_pictures
@@ -30,17 +27,14 @@ def small() -> list[dict[str, Any]]:
     return [synthetic.record(c, "tablecloth", 2000, "float", l) for l in (1, 30) for c in wanted]
 
 
-class Case(unittest.TestCase):
+class Case(shared.InFolder):
     def setUp(self) -> None:
-        temporary = tempfile.TemporaryDirectory(prefix="kbvh-analysis-")
-        self.addCleanup(temporary.cleanup)
-        self.folder = Path(temporary.name) / "results"
+        super().setUp()
+        self.folder = self.folder / "results"
 
     def run_report(self, figures: str = "none") -> tuple[int, str]:
-        err = io.StringIO()
-        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(err):
-            code = report.main([str(self.folder), "--figures", figures, "--print"])
-        return code, err.getvalue()
+        code, _, err = shared.said(report.main, self.folder, "--figures", figures, "--print")
+        return code, err
 
     def page(self, figures: str = "none") -> str:
         code, err = self.run_report(figures)

@@ -8,13 +8,13 @@ import itertools
 import json
 import shutil
 import subprocess
-import tempfile
 import unittest
 from pathlib import Path
 from typing import Any
 from unittest import mock
 
 import paths  # noqa: F401  (finds the modules under test)
+import shared
 import synthetic
 
 from claims import claims
@@ -36,12 +36,7 @@ def line(id: str, times: list[float], scene: str = "s", **strategy: Any) -> dict
     return result
 
 
-class Folder(unittest.TestCase):
-    def setUp(self) -> None:
-        place = tempfile.TemporaryDirectory(prefix="kbvh-analysis-")
-        self.addCleanup(place.cleanup)
-        self.folder = Path(place.name)
-
+class Folder(shared.InFolder):
     def study(self, lines: list[dict[str, Any]], newest_of: tuple[str, ...] = load.ONE_OF_EACH_COMMIT) -> load.Study:
         return load.load(synthetic.write(self.folder, lines), newest_of)
 

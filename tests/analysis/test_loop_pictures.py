@@ -5,12 +5,12 @@ from __future__ import annotations
 import contextlib
 import io
 import json
-import tempfile
 import unittest
 from pathlib import Path
 from typing import Any, Optional
 
 import paths  # noqa: F401  (finds the modules under test)
+import shared
 import synthetic
 
 import numpy as np
@@ -45,12 +45,7 @@ FIRST = [(-0.5, 0, 0.5), (0, 0, 0.5), (-0.25, 0, 1)]
 SECOND = [(0.1, 0, 0.5), (0.6, 0, 0.5), (0.35, 0, 1)]
 
 
-class LoopCase(unittest.TestCase):
-    def setUp(self) -> None:
-        temporary = tempfile.TemporaryDirectory(prefix="kbvh-analysis-")
-        self.addCleanup(temporary.cleanup)
-        self.folder = Path(temporary.name)
-
+class LoopCase(shared.InFolder):
     def write(self, place: str, steps: list[dict[str, Any]], frames: int = 3, head: Optional[dict[str, Any]] = None, tail: str = "") -> Path:
         folder = self.folder / place
         (folder / "frames").mkdir(parents=True)

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import contextlib
 import copy
-import io
 import json
 import re
-import tempfile
 import unittest
-from pathlib import Path
 from typing import Any, Optional
 
 import paths  # noqa: F401  (finds the modules under test)
+import shared
 import synthetic
 
 from figures import colours
@@ -25,17 +22,13 @@ def small() -> list[dict[str, Any]]:
     return [synthetic.record(c, "tablecloth", 2000, "float", l) for l in (1, 30) for c in wanted]
 
 
-class ReportCase(unittest.TestCase):
+class ReportCase(shared.InFolder):
     def setUp(self) -> None:
-        temporary = tempfile.TemporaryDirectory(prefix="kbvh-analysis-")
-        self.addCleanup(temporary.cleanup)
-        self.folder = Path(temporary.name) / "results"
+        super().setUp()
+        self.folder = self.folder / "results"
 
     def run_report(self, *arguments: str) -> tuple[int, str, str]:
-        out, err = io.StringIO(), io.StringIO()
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-            code = report.main([str(self.folder), *arguments])
-        return code, out.getvalue(), err.getvalue()
+        return shared.said(report.main, self.folder, *arguments)
 
     def page(self, lines: list[dict[str, Any]], tail: Optional[str] = None, figures: str = "none", title: str = "T") -> str:
         synthetic.write(self.folder, lines, tail)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-import tempfile
 import unittest
-from pathlib import Path
 from typing import Any
 
 import paths  # noqa: F401  (finds the modules under test)
+import shared
 
 from ratios import robustness
 from results.load import ResultError
@@ -28,12 +27,7 @@ def stress(rows: list[dict[str, Any]], failures: list[dict[str, Any]]) -> dict[s
     }  # fmt: skip
 
 
-class TestRobustness(unittest.TestCase):
-    def setUp(self) -> None:
-        temporary = tempfile.TemporaryDirectory(prefix="kbvh-analysis-")
-        self.addCleanup(temporary.cleanup)
-        self.folder = Path(temporary.name)
-
+class TestRobustness(shared.InFolder):
     def write(self, name: str, content: Any) -> None:
         (self.folder / name).write_text(json.dumps(content))
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import copy
 import json
 import re
-import tempfile
 import unittest
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any, Callable
 
 import paths  # noqa: F401  (finds the modules under test)
+import shared
 import synthetic
 from test_claims import Line, Where, both, l_of, line, of, times
 
@@ -56,12 +56,7 @@ def tablecloth() -> list[Line]:
     return world("tablecloth", (2000, 16000))
 
 
-class Case(unittest.TestCase):
-    def setUp(self) -> None:
-        temporary = tempfile.TemporaryDirectory(prefix="kbvh-analysis-")
-        self.addCleanup(temporary.cleanup)
-        self.folder = Path(temporary.name)
-
+class Case(shared.InFolder):
     def row(self, id: str, lines: list[Line], *changes: Callable[[list[Line]], None]) -> claims.Row:
         for change in changes:
             change(lines)

@@ -6,12 +6,12 @@ import contextlib
 import copy
 import io
 import json
-import tempfile
 import unittest
 from pathlib import Path
 from typing import Any, Optional
 
 import paths  # noqa: F401  (finds the modules under test)
+import shared
 import synthetic
 
 from report import report, targets_table
@@ -44,19 +44,14 @@ def rows() -> list[dict[str, Any]]:
     ]
 
 
-class TargetsCase(unittest.TestCase):
+class TargetsCase(shared.InFolder):
     def setUp(self) -> None:
-        temporary = tempfile.TemporaryDirectory(prefix="kbvh-analysis-")
-        self.addCleanup(temporary.cleanup)
-        self.folder = Path(temporary.name)
+        super().setUp()
         self.file = self.folder / "targets.json"
 
     def run_main(self, value: Any, *arguments: str) -> tuple[int, str, str]:
         self.file.write_text(value if isinstance(value, str) else json.dumps(value), encoding="utf-8")
-        out, err = io.StringIO(), io.StringIO()
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-            code = targets_table.main([str(self.file), *arguments])
-        return code, out.getvalue(), err.getvalue()
+        return shared.said(targets_table.main, self.file, *arguments)
 
 
 class TestMarkdown(TargetsCase):

@@ -5,12 +5,11 @@ from __future__ import annotations
 import contextlib
 import io
 import json
-import tempfile
 import unittest
-from pathlib import Path
 from typing import Any, Optional
 
 import paths  # noqa: F401  (finds the modules under test)
+import shared
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -59,12 +58,7 @@ def panel(figure: Optional[Figure], beginning: str) -> Axes:
     return next(axes for axes, title in zip(figure.axes, titles) if title.startswith(beginning))
 
 
-class TheoryCase(unittest.TestCase):
-    def setUp(self) -> None:
-        temporary = tempfile.TemporaryDirectory(prefix="kbvh-analysis-")
-        self.addCleanup(temporary.cleanup)
-        self.folder = Path(temporary.name)
-
+class TheoryCase(shared.InFolder):
     def write(self, value: Any) -> None:
         text = value if isinstance(value, str) else json.dumps(value)
         (self.folder / "theory.json").write_text(text, encoding="utf-8")

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 import tempfile
 import unittest
 from pathlib import Path
 from typing import Any
 
 import paths  # noqa: F401  (finds the modules under test)
+import shared
 import synthetic
 from test_headline import line
 
@@ -30,10 +29,7 @@ class TestWorstFrames(unittest.TestCase):
     def run_main(self, records: list[dict[str, Any]], *arguments: str) -> tuple[int, str, str]:
         with tempfile.TemporaryDirectory(prefix="kbvh-analysis-") as folder:
             source = synthetic.write(Path(folder), records)
-            out, err = io.StringIO(), io.StringIO()
-            with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-                code = worst_frames.main([str(source), *arguments])
-            return code, out.getvalue(), err.getvalue()
+            return shared.said(worst_frames.main, source, *arguments)
 
     def test_a_worst_frame_is_the_median_of_the_longest_of_each_repetition_and_frame_0_counts_but_in_the_last_column(self) -> None:
         refit = framed("leaf_slabs", [[2.0, 2.0, 5.0], [2.0, 7.0, 2.0], [2.0, 2.0, 6.0]])

@@ -327,8 +327,7 @@ TEST(Registry, RejectsWhatItDoesNotKnow) {
 // The driver's promises that hold for every strategy: time does not run backwards, and `reset` starts over.
 TEST_P(Configurations, TimeRunsForwardAndResetStartsOver) {
   const StrategyEntry& entry = find_strategy(GetParam());
-  const auto run = [&](const auto& test) {
-    using S = std::remove_cvref_t<decltype(test.scene.bodies[0].plans.keyframe(0)[0])>;
+  const auto run = [&]<class S>(const TestScene<S>& test) {
     if (entry.factory<S>() == nullptr) return;
     Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred});
     PhaseTimes times;
@@ -438,8 +437,7 @@ INSTANTIATE_TEST_SUITE_P(Registry, Spans,
 // Changes of geometry are made as a whole or refused as a whole, before the strategy sees them.
 TEST_P(Configurations, ChangesOfGeometryAreRefusedAsAWhole) {
   const StrategyEntry& entry = find_strategy(GetParam());
-  const auto run = [&](const auto& test) {
-    using S = std::remove_cvref_t<decltype(test.scene.bodies[0].plans.keyframe(0)[0])>;
+  const auto run = [&]<class S>(const TestScene<S>& test) {
     if (entry.factory<S>() == nullptr) return;
     Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred});
     PhaseTimes times;

@@ -102,8 +102,7 @@ TEST_P(Contacts, AreThoseOfEveryFeatureWithEveryOther) {
   // Nearly every decision in these scenes needs exact arithmetic, some with integers of thousands of bits.
   const bool costly = GetParam() == "extreme_velocities" || GetParam() == "integer_ties" ||
                       GetParam() == "self_sheets_crumpled" || GetParam() == "self_coincident";
-  const auto run = [&](const auto& test) {
-    using S = std::remove_cvref_t<decltype(test.scene.bodies[0].plans.keyframe(0)[0])>;
+  const auto run = [&]<class S>(const TestScene<S>& test) {
     const Truth<S> truth = truth_of(test.scene);
     for (const StrategyEntry& entry : registry()) {
       if (!entry.info.can.contacts) continue;

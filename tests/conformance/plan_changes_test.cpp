@@ -56,12 +56,9 @@ class PlanChanges : public testing::TestWithParam<std::string> {
   }
 };
 
-#define KBVH_SCALAR(test) std::remove_cvref_t<decltype((test).scene.bodies[0].plans.keyframe(0)[0])>
-
 TEST_P(PlanChanges, OneVertexSeveralTimesAtOnce) {
   for (const std::string scene : {"soups", "integer_ties"})
-    conforms_with(scene, 3, "a vertex changed thrice in one call", [](auto& test) {
-      using S = KBVH_SCALAR(test);
+    conforms_with(scene, 3, "a vertex changed thrice in one call", []<class S>(TestScene<S>& test) {
       const double when = test.frames[2];
       test.script.steps.push_back(
           {when,
@@ -74,8 +71,7 @@ TEST_P(PlanChanges, OneVertexSeveralTimesAtOnce) {
 
 // In the mirrored sheet every pair of vertices meets at t = 0.5: the event, the frame and the change are one.
 TEST_P(PlanChanges, AtTheExactTimeOfEvents) {
-  conforms_with("all_cross_at_once", 2, "changes at the time of all events", [](auto& test) {
-    using S = KBVH_SCALAR(test);
+  conforms_with("all_cross_at_once", 2, "changes at the time of all events", []<class S>(TestScene<S>& test) {
     for (const std::size_t frame : {std::size_t(1), std::size_t(3)}) {
       std::vector<PlanChange<S>> changes;
       for (std::uint32_t v = 0; v < test.scene.bodies[0].plans.vertex_count(); v += 2)
@@ -114,8 +110,7 @@ TEST_P(PlanChanges, AtTheExactTimeOfEvents) {
 
 TEST_P(PlanChanges, AtKeyframesAndAtTheFirstAndTheLastFrame) {
   for (const std::string scene : {"soups", "integer_ties", "four_bodies_own_keyframes", "zero_motion"})
-    conforms_with(scene, 4, "changes at keyframes", [](auto& test) {
-      using S = KBVH_SCALAR(test);
+    conforms_with(scene, 4, "changes at keyframes", []<class S>(TestScene<S>& test) {
       const std::vector<double> keyframes = overlaid_keyframes(test.scene);
       for (const double t : keyframes) {
         std::vector<PlanChange<S>> changes;
@@ -174,8 +169,7 @@ TEST_P(PlanChanges, ThousandsAtOnce) {
 }
 
 TEST_P(PlanChanges, OfVerticesThatNoPrimitiveUses) {
-  conforms_with("soups", 3, "a vertex without a primitive", [](auto& test) {
-    using S = KBVH_SCALAR(test);
+  conforms_with("soups", 3, "a vertex without a primitive", []<class S>(TestScene<S>& test) {
     for (Body<S>& body : test.scene.bodies) {  // removes every fourth triangle, but not its vertices
       Primitives fewer;
       for (std::uint32_t p = 0; p < body.primitives.count(); ++p)
@@ -192,8 +186,7 @@ TEST_P(PlanChanges, OfVerticesThatNoPrimitiveUses) {
 // If any one of several changes is invalid, none is made: the clip continues as if there had been no request.
 TEST_P(PlanChanges, ErrorsChangeNothing) {
   const StrategyEntry& entry = find_strategy(GetParam());
-  const auto run = [&](const auto& test) {
-    using S = KBVH_SCALAR(test);
+  const auto run = [&]<class S>(const TestScene<S>& test) {
     if (entry.factory<S>() == nullptr) return;
     constexpr S infinity = std::numeric_limits<S>::infinity(), nan = std::numeric_limits<S>::quiet_NaN();
     const Contestant contestant{&entry, {}, entry.info.topology.preferred};
@@ -245,8 +238,7 @@ TEST_P(PlanChanges, ErrorsChangeNothing) {
 // A reset session plays the scene's own plans again, and then the script as before.
 TEST_P(PlanChanges, ResetForgetsThem) {
   const StrategyEntry& entry = find_strategy(GetParam());
-  const auto run = [&](const auto& test) {
-    using S = KBVH_SCALAR(test);
+  const auto run = [&]<class S>(const TestScene<S>& test) {
     if (entry.factory<S>() == nullptr) return;
     Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred});
     Oracle<S> with(test.scene, {}, hash(test.script)), without(test.scene);

@@ -15,8 +15,7 @@ namespace {
 class Rays : public testing::TestWithParam<std::string> {};
 
 TEST_P(Rays, MeetWhatEveryPrimitiveSays) {
-  const auto run = [&](const auto& test) {
-    using S = std::remove_cvref_t<decltype(test.scene.bodies[0].plans.keyframe(0)[0])>;
+  const auto run = [&]<class S>(const TestScene<S>& test) {
     Truth<S> truth;
     std::uint64_t hits = 0;
     for (const StrategyEntry& entry : registry()) {

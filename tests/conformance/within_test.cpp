@@ -14,8 +14,7 @@ namespace {
 class Within : public testing::TestWithParam<std::string> {};
 
 TEST_P(Within, IsWhatEveryPrimitiveSays) {
-  const auto run = [&](const auto& test) {
-    using S = std::remove_cvref_t<decltype(test.scene.bodies[0].plans.keyframe(0)[0])>;
+  const auto run = [&]<class S>(const TestScene<S>& test) {
     std::map<std::size_t, WithinTruth<S>> truth;
     std::uint64_t hits = 0;
     for (const StrategyEntry& entry : registry()) {
@@ -206,8 +205,7 @@ std::string first_violation() {
   info.guarantee = Guarantee::approximate;  // of pairs, which it does not find
   const StrategyEntry entry = make_entry<With<fault>::template Strategy>(info);
   std::uint64_t hits = 0;
-  const auto play = [&](const auto& test) {
-    using S = std::remove_cvref_t<decltype(test.scene.bodies[0].plans.keyframe(0)[0])>;
+  const auto play = [&]<class S>(const TestScene<S>& test) {
     std::map<std::size_t, WithinTruth<S>> truth;
     return within_violation(entry, test, {}, {}, truth, hits);
   };

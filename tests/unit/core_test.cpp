@@ -117,8 +117,7 @@ TEST(Topology, CheckFindsBrokenInvariants) {
 }
 
 TEST(Oracle, SweepEqualsBruteForceEverywhere) {
-  const auto compare = [](const auto& scene) {
-    using S = std::remove_cvref_t<decltype(scene.bodies[0].plans.keyframe(0)[0])>;
+  const auto compare = []<class S>(const Scene<S>& scene) {
     Playback<S> playback(scene);
     std::size_t pairs = 0;
     for (double t : frame_times(scene, 3)) {
