@@ -206,6 +206,11 @@ TEST(Verdict, FramesAndUpdates) {
   expect_flip(good, holds, fails, judge_independent_of_frames, [](FrameRun& r) { ++r.events; });
   expect_flip(good, holds, fails, judge_independent_of_frames, [](FrameRun& r) { r.same_log = 0; });
   expect_flip(good, holds, fails, judge_independent_of_frames, [](FrameRun& r) { ++r.bottom_up_values; });
+  // A clip that was played at one frame rate only is not compared, and not counted.
+  std::vector<FrameRun> more = good;
+  more.push_back(good[0]);
+  more.back().scene = "played once";
+  EXPECT_EQ(judge_independent_of_frames(more).why, judge_independent_of_frames(good).why);
   const auto never = [](const std::vector<FrameRun>& runs) { return judge_never_more_updates(runs, {}); };
   expect_flip(good, holds, condition, never, [](FrameRun& r) { r.worse_frames = r.repeated_frames = 1; });
   expect_flip(good, holds, fails, never, [](FrameRun& r) { r.worse_frames = r.worse_without_repeat = 1; });
@@ -320,6 +325,12 @@ TEST(Verdict, HigherOrder) {
   expect_flip(good, holds, condition, judge_order, [](OrderRun& r) { r.certificates = 401; });
   expect_flip(good, holds, condition, judge_order, [](OrderRun& r) { r.box_tests = 5001; });
   EXPECT_EQ(judge_order({binary}).verdict(), Verdict::not_decided);
+  // A clip without events is not compared, and not counted.
+  OrderRun still = binary, wide_still = wide;
+  still.scene = wide_still.scene = "still";
+  still.events = wide_still.events = 0;
+  const std::string why = judge_order({binary, wide, still, wide_still}).why;
+  EXPECT_NE(why.find(" 1 clip has 0.6 of"), std::string::npos) << why;
 }
 
 TEST(Verdict, Rebuilding) {
