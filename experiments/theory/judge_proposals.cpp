@@ -45,10 +45,12 @@ Claim judge_order(const std::vector<OrderRun>& orders) {
   for (const OrderRun& run : orders)
     if (run.width == 2) binary[place(run)] = &run;
   std::vector<double> events, values, certificates, steps, tests;
+  std::set<std::string> clips;
   for (const OrderRun& run : orders) {
     const auto two = binary.find(place(run));
     if (run.width == 2 || two == binary.end() || two->second->events == 0) continue;
     const OrderRun& other = *two->second;
+    clips.insert(place(run));
     const std::string where = fmt::format(", {} children, {}", run.width, place(run));
     const auto compare = [&](const char* what, std::uint64_t mine, std::uint64_t bound, Role role,
                              std::vector<double>& shares) {
@@ -66,10 +68,10 @@ Claim judge_order(const std::vector<OrderRun>& orders) {
       fmt::format("events {}, changes {}, certificates {}, comparisons {}, box tests {} of the binary tree's",
                   range(events), range(values), range(certificates), range(steps), range(tests));
   claim.why = fmt::format(
-      "With four and eight children per node, {} clips have {} of the binary tree's events and {} of its "
-      "changes of bounds, with {} of its certificates, {} of its comparisons in the queue and {} of its box "
-      "tests.",
-      binary.size(), range(events), range(values), range(certificates), range(steps), range(tests));
+      "With four and eight children per node, {} {} {} of the binary tree's events and {} of its changes of "
+      "bounds, with {} of its certificates, {} of its comparisons in the queue and {} of its box tests.",
+      counted(clips.size(), "clip"), clips.size() == 1 ? "has" : "have", range(events), range(values),
+      range(certificates), range(steps), range(tests));
   return claim;
 }
 

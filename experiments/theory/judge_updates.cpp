@@ -168,9 +168,10 @@ Claim judge_independent_of_frames(const std::vector<FrameRun>& frames) {
   std::map<std::string, std::vector<const FrameRun*>> scenes;
   for (const FrameRun& run : frames) scenes[run.scene + std::to_string(run.triangles)].push_back(&run);
   double spread = 0, grows = 0, most_l = 0;
-  std::uint64_t events = 0, differ = 0;
+  std::uint64_t clips = 0, events = 0, differ = 0;
   for (const auto& [key, runs] : scenes) {
     if (runs.size() < 2) continue;
+    ++clips;
     const FrameRun& first = *runs[0];
     for (const FrameRun* run : runs) {
       const double off = std::abs(double(run->events) - double(first.events)) +
@@ -196,7 +197,7 @@ Claim judge_independent_of_frames(const std::vector<FrameRun>& frames) {
   claim.why = fmt::format(
       "{} with {} events in all, played at up to {} frames per keyframe interval: {}, while bottom-up writes "
       "{:.4g} times as many values as at the lowest rate.",
-      counted(scenes.size(), "clip"), number(events), number(most_l),
+      counted(clips, "clip"), number(events), number(most_l),
       spread == 0 && differ == 0 ? "events, changes and their order are the same at every rate"
                                  : "events or changes differ by up to " + number(spread) + ", and " +
                                        number(differ) + " logs differ",

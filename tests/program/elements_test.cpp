@@ -325,9 +325,9 @@ TEST(Elements, WrongRadiiAreRefused) {
                        "a scene with a script has none"));
   EXPECT_TRUE(
       contains(told(R"({"builtin": "reversing_spheres", "radius": 0.1})"), "it changes plans at run time"));
-  EXPECT_TRUE(
-      contains(told(R"({"bodies": ["sphere:triangles=20,keyframes=3,curves=smooth"], "radius": 0.1})"),
-               "a scene with smooth curves has none"));
+  EXPECT_TRUE(contains(
+      told(R"({"bodies": ["sphere:triangles=20,step=0:0:0.1,keyframes=3,curves=smooth"], "radius": 0.1})"),
+      "a scene with smooth curves has none"));
   const json thrown{{"builtin", "thrown_shards"}, {"triangles", 8}, {"keyframes", 4}, {"radius", 0.1}};
   EXPECT_TRUE(contains(complaint([&] { assemble<float>(load(spec_of(thrown))); }), "move on curves"));
   json wide = sheet_with({{"radius", 1e40}});

@@ -165,7 +165,7 @@ TEST(Plan, WhatIsGivenTwiceIsMeasuredOnce) {
 TEST(Plan, ErrorsNameFileKeyAndValue) {
   EXPECT_EQ(plan_complaint(R"({"scenes": "tablecloth", "repetition": 3})"),
             "p.json: there is no key 'repetition'; known are builder, changes, continuous, description, "
-            "frames_limit, interval_width, kernels, l, name, "
+            "frames_limit, interval_width, kernels, l, live, name, "
             "oracle_every, params, rays, repetitions, scalars, scenes, seconds, strategies, studies, "
             "targets, within; did you mean "
             "'repetitions'?");

@@ -29,6 +29,12 @@ TEST(Verdict, HigherOrder) {
   expect_flip(good, holds, condition, judge_order, [](OrderRun& r) { r.certificates = 401; });
   expect_flip(good, holds, condition, judge_order, [](OrderRun& r) { r.box_tests = 5001; });
   EXPECT_EQ(judge_order({binary}).verdict(), Verdict::not_decided);
+  // A clip without events is not compared, and not counted.
+  OrderRun still = binary, wide_still = wide;
+  still.scene = wide_still.scene = "still";
+  still.events = wide_still.events = 0;
+  const std::string why = judge_order({binary, wide, still, wide_still}).why;
+  EXPECT_NE(why.find(" 1 clip has 0.6 of"), std::string::npos) << why;
 }
 
 TEST(Verdict, Rebuilding) {

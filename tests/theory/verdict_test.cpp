@@ -194,6 +194,11 @@ TEST(Verdict, FramesAndUpdates) {
   expect_flip(good, holds, fails, judge_independent_of_frames, [](FrameRun& r) { ++r.events; });
   expect_flip(good, holds, fails, judge_independent_of_frames, [](FrameRun& r) { r.same_log = 0; });
   expect_flip(good, holds, fails, judge_independent_of_frames, [](FrameRun& r) { ++r.bottom_up_values; });
+  // A clip that was played at one frame rate only is not compared, and not counted.
+  std::vector<FrameRun> more = good;
+  more.push_back(good[0]);
+  more.back().scene = "played once";
+  EXPECT_EQ(judge_independent_of_frames(more).why, judge_independent_of_frames(good).why);
   const auto never = [](const std::vector<FrameRun>& runs) { return judge_never_more_updates(runs, {}); };
   expect_flip(good, holds, condition, never, [](FrameRun& r) { r.worse_frames = r.repeated_frames = 1; });
   expect_flip(good, holds, fails, never, [](FrameRun& r) { r.worse_frames = r.worse_without_repeat = 1; });
