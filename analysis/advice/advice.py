@@ -153,12 +153,15 @@ class Advice:
     unsure: int = 0  #: other cells in which the interval of its ratio contains 1, or the machine was disturbed
     why: str = ""  #: which of the two
     at: tuple[str, str] = ("", "")  #: scenes of the cells with the shortest, and the longest time
+    losses: list[tuple[str, float]] = field(default_factory=list)  #: cells in which it is slower than the best refit, and its speeds there
+    equals: list[str] = field(default_factory=list)  #: of a best refit: titles of other refits that no interval tells apart from it
+    per_primitive: tuple[float, float] = (math.nan, math.nan)  #: nanoseconds per frame and primitive: least and most of the cells
 
     @property
     def says(self) -> str:
-        """Writes the speed out, as in "1.6 times as fast as the best refit (faster in 7 of 8 scenes, slowest on ball, 2k, l = 10: 0.9 to 2.1)"."""
+        """Writes the speed out, as in "1.6 times as fast as the best refit (faster in 7 of 8 scenes, 0.90 to 2.10; slower on ball, 2k, l = 10)"."""
         missing = f", measured in {self.measured}" if self.measured < self.cells else ""
-        doubt = self._doubt
+        doubt = self._doubt(self.doubtful)
         disturbed = f" ({doubt})" if doubt else ""
         if self.baseline and not self.best_in:
             span = text.factor(self.low) + (f" to {text.factor(self.high)}" if self.low < self.high else "")
@@ -167,27 +170,30 @@ class Advice:
             where = f"in the only {self.word}" if self.cells == 1 else f"in {self.best_in} of {text.plural(self.cells, self.word)}"
             behind = "less than 1\u00a0% slower" if text.factor(self.low) == "1.00" else f"at worst {text.factor(self.low)} times as fast"
             worst = f"; elsewhere {behind}" if self.best_in < self.cells else ""
-            return f"the best refit {where}{worst}{missing}{disturbed}"
+            equal = f" ({text.listing(self.equals)} {'is' if len(self.equals) == 1 else 'are'} as fast, within the 95\u00a0% interval)" if self.equals else ""
+            return f"the best refit {where}{worst}{missing}{equal}{disturbed}"
         span = f"{text.factor(self.low)} to {text.factor(self.high)}" if self.low < self.high else ""
         of = f"in {text.plural(self.cells, self.word)}"
         if span and self.cells == 1:
             of = ("95\u00a0% interval " if self.is_interval else "range of its rounds ") + span
         elif span:
             of = f"faster in {self.faster} of {text.plural(self.measured, self.word)}, {span}"
-            of += f", slowest on {self.worst}" if self.faster < self.measured else ""
+            of += f"; slower on {lost(self)}" if self.losses else ""
+            named = {title for title, _ in self.losses[:3]}
+            rest = [one for one in self.doubtful if one[0] not in named]
+            doubt = self._doubt(rest) if rest else ""
         doubt = f"; {doubt}" if doubt else ""
         mean = " on average" if self.cells > 1 else ""
         return f"{text.factor(self.speed)} times as fast as {self.refit}{mean} ({of}{missing}{doubt})"
 
-    @property
-    def _doubt(self) -> str:
-        """Names the ratios that a disturbed machine makes doubtful, each with its cell."""
+    def _doubt(self, doubtful: Sequence[tuple[str, float]]) -> str:
+        """Names ratios that a disturbed machine makes doubtful, each with its cell."""
         if not self.disturbed:
             return ""
-        if self.cells == 1 or not self.doubtful:
+        if self.cells == 1 or not doubtful:
             return "a doubtful run: the machine was disturbed"
-        named = [f"{text.factor(speed)} on {title}" for title, speed in self.doubtful[:2]]
-        more = f" and {len(self.doubtful) - 2} more" if len(self.doubtful) > 2 else ""
+        named = [f"{text.factor(speed)} on {title}" for title, speed in doubtful[:2]]
+        more = f" and {len(doubtful) - 2} more" if len(doubtful) > 2 else ""
         return f"doubtful, from a disturbed machine: {', '.join(named)}{more}"
 
     @property
@@ -212,6 +218,20 @@ class Advice:
             return f"{low} ms a frame ({small} triangles)"
         first, last = (f"{one}, " if one else "" for one in self.at)
         return f"{low} ms ({first}{small}) to {high} ms ({last}{large} triangles) a frame"
+
+
+    @property
+    def rates(self) -> str:
+        """Writes the times per primitive out, as in "2.3 to 17 ns a triangle": for sizes between those that were measured. "" of a single cell."""
+        low, high = (text.significant(one, 2) for one in self.per_primitive)
+        return f"{low} to {high} ns a triangle" if self.measured > 1 and low != high else ""
+
+
+def lost(one: Advice) -> str:
+    """Names the cells in which a strategy is slower than the best refit, three at most, with its speeds and whether they are doubtful."""
+    doubtful = {title for title, _ in one.doubtful}
+    named = [f"{title}: {text.factor(speed)}{', a doubtful run: the machine was disturbed' if title in doubtful else ''}" for title, speed in one.losses[:3]]
+    return "; ".join(named) + (f"; and {len(one.losses) - 3} more" if len(one.losses) > 3 else "")
 
 
 @dataclass
@@ -324,6 +344,7 @@ def advise(own: Sequence[Cell], known: str) -> Optional[Advice]:
     refits = {cell.best_refit for cell in measured}
     one_refit = next(iter(refits)) if len(refits) == 1 else ""
     scenes = {cell.title.split(", ")[0] for cell in own}
+    rates = [1e6 * cell.times[best] / cell.primitives for cell in measured if cell.primitives > 0] or [math.nan]
     return Advice(
         best, facts.title, facts.baseline, most, low, high, len(own), len(measured), worst.title,
         sum(cell.best_refit == best for cell in measured), any(best in cell.doubtful for cell in measured), is_interval,
@@ -333,7 +354,24 @@ def advise(own: Sequence[Cell], known: str) -> Optional[Advice]:
         doubtful=[(cell.title, cell.speeds[best]) for cell in measured if best in cell.doubtful],
         slower=sum(cell.speeds[best] < 1 for cell in measured), unsure=len(unsure), why=" or ".join(dict.fromkeys(unsure)),
         at=(ends[0].title.split(", ")[0], ends[1].title.split(", ")[0]) if len(scenes) > 1 else ("", ""),
+        losses=sorted(((cell.title, cell.speeds[best]) for cell in measured if cell.speeds[best] < 1), key=lambda one: one[1]),
+        equals=_equals(own, best) if facts.baseline else [], per_primitive=(min(rates), max(rates)),
     )  # fmt: skip
+
+
+#: A refit that is slower than this share of the best one's speed in some cell is not asked for its interval: that takes long.
+NEAR = 0.9
+
+
+def _equals(own: Sequence[Cell], best: str) -> list[str]:
+    """Returns the titles of the other refits that no interval of any cell tells apart from the best refit of all of them."""
+    found = []
+    if any(cell.best_refit != best for cell in own):
+        return []
+    for id in sorted({id for cell in own for id in cell.speeds if cell.facts[id].baseline and id != best}):
+        if all(NEAR <= cell.speeds.get(id, 0) <= 1 and (span := cell.span(id)) is not None and span[2] and span[1] >= 1 for cell in own):
+            found.append(own[0].facts[id].title)
+    return found
 
 
 def _unsure(cell: Cell, id: str) -> str:
@@ -399,9 +437,11 @@ def sentence(one: Situation) -> str:
 
 
 def brief(one: Situation) -> str:
-    """Writes the advice of a situation shorter, for measurements that are quoted: titles, times, and in how many scenes each is faster."""
+    """Writes the advice of a situation shorter, for measurements that are quoted: titles, times, also per triangle, and in how many scenes
+    each is faster."""
     parts = [
-        f"{best.title}{f' if {known}' if i else ''}, {best.costs}" + ("" if best.baseline else f"; {best.says}; {best.sure}")
+        f"{best.title}{f' if {known}' if i else ''}, {best.costs}{f' ({best.rates})' if best.rates else ''}"
+        + (f"; {best.says}" if best.equals or not best.baseline else "") + ("" if best.baseline else f"; {best.sure}")
         for i, (known, best) in enumerate(changes(one))
     ]
     return f"{said_of(one.frames)}: {'; '.join(parts)}"

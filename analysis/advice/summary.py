@@ -129,8 +129,9 @@ def on_the_main_claim(one: Verdict) -> str:
     if not answers:
         return claim
     said = ". ".join(f"{refit}: {', '.join(parts)}" for refit, parts in answers.items())
-    where = "".join(f" {name[0].upper()}{name[1:]}: {_plain(known[id][1])}." for id, _, _, name in ASKED if id in known and known[id][1])
-    return f"Is updating a kinetic AABB tree faster than a bottom-up refit? {said}.{_on_others(one)} {claim}{where}"
+    where = [f"{name}, {_plain(known[id][1]).removeprefix('met ')}" for id, _, _, name in ASKED if id in known and known[id][1]]
+    factor = f" Where its factor is met: {'; '.join(where)}." if where else ""
+    return f"Is updating a kinetic AABB tree faster than a bottom-up refit? {said}. {claim}{factor}{_on_others(one)}"
 
 
 def _on_others(one: Verdict) -> str:
@@ -140,8 +141,11 @@ def _on_others(one: Verdict) -> str:
     if moving is None or answer(moving[1]) == "no":
         return ""
     since = re.search(r"met from l = ([\d.]+) on with motion", rules)
-    reach = f"; from {since[1]} frames a keyframe on they reach the claimed factor" if since else ""
-    return f" Other kinetic trees: {answer(moving[1])}, positions counted ({moving[1]} times as fast as today's best refit{reach})."
+    reach = f"; the claimed factor is met from {since[1]} frames a keyframe on" if since else ""
+    return (
+        f" Kinetic trees of other kinds against today's best refit, if the time counts that it takes to evaluate positions: {answer(moving[1])} "
+        f"({moving[1]} times as fast{reach})."
+    )
 
 
 def answer(span: str) -> str:
@@ -250,7 +254,9 @@ def on_larger(found: Sequence[Situation], reference: Path = REFERENCE) -> list[s
     kept = kept_cells(reference)
     said, absent = [], []
     for name in classes:
-        told = [f"with {advice.brief(one)}" for one in _ends(advice.situations(own_cells(kept, name)))] if kept else []
+        situations = advice.situations(own_cells(kept, name)) if kept else []
+        ends = _ends(situations)
+        told = [f"with {advice.brief(one)}" for one in ends] + [lost for one in situations if one not in ends and (lost := _losses(one))]
         if told and kept:
             said.append(f"By measurements that come with the project ({kept.short}), {name} triangles: {'. '.join(one[0].upper() + one[1:] for one in told)}.")
         else:
@@ -258,6 +264,12 @@ def on_larger(found: Sequence[Situation], reference: Path = REFERENCE) -> list[s
     first = f"This study has at most {text.size(largest)} triangles, both bodies together."
     none = [f"{text.listing(absent)} {'were' if len(absent) > 1 else 'was'} not measured."] if absent else []
     return [" ".join([first, *said, *(one[0].upper() + one[1:] for one in none)])]
+
+
+def _losses(one: Situation) -> str:
+    """Says where what a situation recommends loses to the best refit; "" if nothing does."""
+    lost = [f"{best.title} is slower than the best refit on {advice.lost(best)}" for _, best in advice.changes(one) if best.losses]
+    return f"with {advice.said_of(one.frames)} {'; '.join(lost)}" if lost else ""
 
 
 def on_others(found: Sequence[Situation], reference: Path = REFERENCE) -> str:
@@ -292,15 +304,15 @@ def _on_positions_only(found: Sequence[Situation], reference: Path) -> list[str]
     if any(one.frames == only for one in own):
         return []
     says = f"Pairs within a body with {advice.said_of(only)}, and above {text.size(max(one.sizes[1] for one in own))} triangles, were not measured in this study."
+    first = own[-1].advice[0][1]
+    if first is not None and first.baseline:
+        says += f" {first.title[0].upper()}{first.title[1:]} uses no keyframes: take it with positions only, too; its time there is not known."
     kept = kept_cells(reference)
     known = [one for one in advice.situations([cell for cell in kept.cells if cell.asks == advice.SELF])] if kept else []
     if kept and known:
         nearest = next((one for one in known if one.frames == only), known[0])
         titles = text.listing([cell.title for cell in kept.cells if (cell.asks, cell.frames) == (nearest.asks, nearest.frames)])
         says += f" Nearest, by measurements that come with the project ({kept.short}; {titles}): {advice.brief(nearest)}."
-    first = own[-1].advice[0][1]
-    if first is not None and first.baseline:
-        says += f" {first.title[0].upper()}{first.title[1:]} uses no keyframes, so it can be taken with positions only, too; its time there is not known."
     return [says]
 
 

@@ -140,10 +140,10 @@ def kept(file: Path = summary.REFERENCE / cells_file.FILE) -> Optional[dict[str,
             raise ResultError(f"{file}: the cell {cell.title} has no size or no l in its title.")
         cells.append({
             "title": cell.title, "asks": cell.asks, "size": parts[1] + parts[2],
-            "primitives": number(float(parts[1]) * {"": 1, "k": 1e3, "M": 1e6}[parts[2]], 3), "l": number(float(parts[3])),
-            "refit": cell.best_refit, "speeds": {id: number(speed, 4) for id, speed in cell.speeds.items()},
-            "times": {id: number(time, 4) for id, time in cell.times.items()}, "doubtful": sorted(cell.doubtful),
-            "spans": {id: [number(span[0], 3), number(span[1], 3)] for id in cell.speeds if (span := cell.span(id))},
+            "primitives": number(cell.primitives), "l": number(float(parts[3])),
+            "refit": cell.best_refit, "speeds": {id: number(speed, 7) for id, speed in cell.speeds.items()},
+            "times": {id: number(time, 7) for id, time in cell.times.items()}, "doubtful": sorted(cell.doubtful),
+            "spans": {id: [number(span[0], 7), number(span[1], 7), span[2]] for id in cell.speeds if (span := cell.span(id))},
         })  # fmt: skip
     facts = {id: fact for cell in found.cells for id, fact in cell.facts.items()}
     return {

@@ -207,7 +207,7 @@ def sentences(study: Study, place: Place) -> list[str]:
         if exact is None or (exact.contestant, few.contestant if few else "") in told:
             continue
         says = f"{words}, on one scene ({place.title}): "
-        allowing = f"allowing {FEW:.0%} missed pairs ".replace("%", "\u00a0%")
+        allowing = f"missing up to {FEW:.0%} of the pairs ".replace("%", "\u00a0%")
         if few is None:
             says += f"no approximate contestant missed less than {FEW:.0%}.".replace("%", "\u00a0%")
         else:
@@ -217,7 +217,7 @@ def sentences(study: Study, place: Place) -> list[str]:
             other = f"the fastest exact one, {exact.name}, takes {text.milliseconds(exact.time)}\u00a0ms a frame"
             wins = few.time < exact.time
             times = _times_as_fast(study, few, exact) if wins else _times_as_fast(study, exact, few)
-            says += f"{allowing}is {times}: {one}; {other}." if wins else f"{allowing}gains nothing: {other} and is {times} as the fastest with errors ({one})."
+            says += f"{allowing}makes a frame {times}: {one}; {other}." if wins else f"{allowing}gains nothing: {other} and is {times} as the fastest with errors ({one})."
         told[exact.contestant, few.contestant if few else ""] = says
     return list(told.values())
 

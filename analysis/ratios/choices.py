@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 from results import text
 from results.load import Study
+from results.scene_names import short
 
+FRAMES = r" for \d+ frame"  #: in the report of a strategy that chooses; others report the sizes of what they work with
 TOTAL = ["update", "traversal", "triangle_tests"]  #: phases: the chosen strategy evaluates positions
 
 
@@ -15,22 +18,25 @@ class Choice:
     """One run of a choosing strategy."""
 
     scene: str
-    size: str
+    size: str  #: primitives of both bodies together
     scalar: str
     l: str
-    chosen: str
+    chooser: str
+    chosen: str  #: titles, each with its frames
     seen: str  #: the inputs of the choice
     best: str  #: the fastest of the others in the same table
     ratio: float  #: its total over the chooser's; below 1: another would have been faster
 
 
 def choices(study: Study) -> list[Choice]:
-    """Returns a row for each timed run that reports its choice; the best fixed choices are kbvh's own, with one thread."""
+    """Returns a row for each timed run that reports for how many frames it chose which strategy; the best fixed choices are kbvh's own, with
+    one thread."""
     found = []
     timed = study.timed
+    titles = dict(zip(map(str, study.runs["id"]), map(str, study.runs["title"])))
     for _, rows in timed.groupby("group", sort=False):
         others = rows[(rows["choice"] == "") & (rows["guarantee"] == "exact") & rows["params"].map(_single)]
-        for _, row in rows[rows["choice"] != ""].iterrows():
+        for _, row in rows[rows["choice"].str.contains(FRAMES)].iterrows():
             if others.empty:
                 continue
             totals = others[TOTAL].sum(axis=1)
@@ -38,7 +44,8 @@ def choices(study: Study) -> list[Choice]:
             chosen, _, seen = str(row["choice"]).partition(" (")
             found.append(
                 Choice(
-                    str(row["scene_name"]), text.size(row["moving"]), str(row["scalar"]), f"{row['l']:g}", chosen,
+                    short(str(row["scene"])), text.size(row["primitives"]), str(row["scalar"]), f"{row['l']:g}", str(row["label"]),
+                    re.sub(r"\w+(?= for \d)", lambda id: titles.get(id[0], id[0]), chosen),
                     seen.removesuffix(")"), str(best["label"]), float(totals.min() / row[TOTAL].sum()),
                 )  # fmt: skip
             )

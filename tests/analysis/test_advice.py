@@ -53,10 +53,53 @@ class TestRule(unittest.TestCase):
         self.assertTrue(best.worst.startswith("ball"), best.worst)
         self.assertEqual(best.says, "1.18 times as fast as the refit on average (faster in 2 of 2 scenes, 1.05 to 1.33)")
 
-    def test_losing_cells_are_counted_and_the_worst_is_named(self) -> None:
+    def test_losing_cells_are_counted_and_named(self) -> None:
         lines = [line("refit", 2.0, "cloth"), line("refit", 2.0, "ball"), other("join", 0.5, "cloth"), other("join", 4.0, "ball")]
         best = taken(lines)[0]
-        self.assertIn("(faster in 1 of 2 scenes, 0.50 to 4.00, slowest on ball, 4k, l = 10)", best.says)
+        self.assertIn("(faster in 1 of 2 scenes, 0.50 to 4.00; slower on ball, 4k, l = 10: 0.50)", best.says)
+
+    def test_the_losing_cell_that_is_worst_comes_first_and_three_are_named(self) -> None:
+        lines = [one for i, total in enumerate((3.0, 5.0, 2.5, 4.0, 0.1)) for one in (line("refit", 2.0, f"s{i}"), other("join", total, f"s{i}"))]
+        lines[-1]["times"]["disturbed"] = "9 involuntary switches"
+        best = advice.Advice("join", "join", False, 1, 0.4, 20, 5, 5, "", 0, disturbed=True, faster=1, word="scene", doubtful=[("s4", 20.0), ("s3", 0.5)],
+                             losses=[("s1", 0.4), ("s3", 0.5), ("s0", 0.67), ("s2", 0.8)])  # fmt: skip
+        self.assertEqual(advice.lost(best), "s1: 0.40; s3: 0.50, a doubtful run: the machine was disturbed; s0: 0.67; and 1 more")
+        self.assertTrue(best.says.endswith("; and 1 more; doubtful, from a disturbed machine: 20.0 on s4)"), best.says)
+        found = advice.advise(advice.cells(study(lines)), "the whole clip is known")
+        assert found is not None
+        self.assertEqual((found.id, [round(speed, 2) for _, speed in found.losses]), ("join", [0.4, 0.5, 0.67, 0.8]))
+
+    def test_refits_that_no_interval_tells_apart_are_named(self) -> None:
+        facts = {id: advice.Facts(id, "none", id != "join") for id in ("best", "close", "far", "few", "join")}
+        spans = {"close": (0.95, 1.02, True), "far": (0.93, 0.99, True), "few": (0.9, 1.1, False), "join": (0.9, 1.1, True)}
+
+        def equals(*others: tuple[str, float]) -> list[str]:
+            speeds = {"best": 1.0, "close": 0.98, "far": 0.96, "few": 0.97, "join": 0.99}
+            own = [
+                advice.Cell(f"s{i}, 2k, l = 1", advice.PAIRS, next(iter(advice.FRAMES)), 2000, "best", {**speeds, **dict([one])}, {id: 2.0 for id in speeds},
+                            frozenset(), facts, spans.get)
+                for i, one in enumerate(others)
+            ]  # fmt: skip
+            found = advice.advise(own, "nothing is known")
+            assert found is not None and found.id == "best"
+            return found.equals
+
+        self.assertEqual(equals(("close", 0.98)), ["close"], "neither one that is slower beyond doubt, nor a range of few rounds, nor what is no refit")
+        self.assertEqual(equals(("close", 0.98), ("close", 0.5)), [], "in every cell")
+        best = advice.Advice("a", "a", True, 1, 1, 1, 1, 1, "", 1, word="scene", equals=["close", "lazy"])
+        self.assertEqual(best.says, "the best refit in the only scene (close and lazy are as fast, within the 95\u00a0% interval)")
+
+    def test_several_sizes_have_times_per_triangle(self) -> None:
+        facts = {"refit": advice.Facts("refit", "none", True), "join": advice.Facts("join", "none", False)}
+        own = [
+            advice.Cell(f"{name}, l = 10", advice.PAIRS, list(advice.FRAMES)[-1], primitives, "refit", {"refit": 1.0, "join": 2.0}, {"refit": 2 * ms, "join": ms},
+                        frozenset(), facts, lambda id: None)
+            for name, primitives, ms in (("cloth, 10k", 10_000, 0.1), ("dress, 80k", 80_000, 0.2))
+        ]  # fmt: skip
+        both, one = (advice.advise(own[:count], "nothing is known") for count in (2, 1))
+        assert both is not None and one is not None
+        self.assertEqual((both.rates, one.rates), ("2.5 to 10 ns a triangle", ""))
+        self.assertIn("0.100 ms (cloth, 10k) to 0.200 ms (dress, 80k triangles) a frame (2.5 to 10 ns a triangle); 2.00 times", advice.brief(advice.situations(own)[0]))
 
     def test_cells_of_one_scene_are_not_called_scenes(self) -> None:
         facts = {"refit": advice.Facts("refit", "none", True), "join": advice.Facts("join", "none", False)}
@@ -125,7 +168,7 @@ class TestRule(unittest.TestCase):
         for one, why in ((open_ended, "the interval contains 1"), (single, "there is no interval"), (doubtful, "the run is doubtful")):
             self.assertEqual(best(sure, one).sure, f"surely faster: not beyond doubt, in 1 of 2 scenes {why}")
         self.assertEqual(best(sure, slower).sure, "surely faster: no, 1 of 2 scenes is slower")
-        self.assertIn("; doubtful, from a disturbed machine: 0.79 on s1, 2k, l = 1)", best(sure, slower).says)
+        self.assertIn("; slower on s1, 2k, l = 1: 0.79, a doubtful run: the machine was disturbed)", best(sure, slower).says)
         self.assertEqual(best(sure).sure, "surely faster: yes, in the only scene, intervals included")
         self.assertEqual(advice.Advice("a", "a", True, 1, 1, 1, 1, 1, "", 1).sure, "", "a refit is what the others are compared with")
 

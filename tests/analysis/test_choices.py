@@ -31,6 +31,13 @@ class TestChoices(unittest.TestCase):
         self.assertAlmostEqual(row.ratio, 0.75)
         self.assertEqual((row.chosen, row.seen), ("refit for 190 frames, join for 11 frames", "last seen: nothing"))
 
+    def test_strategies_are_named_by_their_titles_and_sizes_of_what_one_works_with_are_no_choice(self) -> None:
+        chooser, modes, good = line("chooser", 2.0), line("modes", 2.0), line("good", 1.5)
+        chooser["choice"], modes["choice"] = "good for 190 frames, unknown for 1 frame", "modes of body 0: 6"
+        good["strategy"]["title"] = "a good refit"
+        (row,) = self.found([chooser, modes, good])
+        self.assertEqual((row.chooser, row.chosen), ("chooser", "a good refit for 190 frames, unknown for 1 frame"))
+
     def test_without_a_choice_there_is_nothing_to_show(self) -> None:
         self.assertEqual(self.found([line("slow", 3.0)]), [])
 

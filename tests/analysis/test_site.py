@@ -53,7 +53,7 @@ class Errors(unittest.TestCase):
         self.assertGreater(len(figures), 0)
         for figure in figures:
             self.assertRegex(figure, r"\nMeasured \d{4}-\d\d-\d\d.* by commit [0-9a-f]{8}.*: \d+ contestants, \d+ .*rounds?; the machine was (quiet|disturbed while \d+)")
-            self.assertRegex(figure, r"allowing 1\xa0% missed pairs|no approximate contestant")
+            self.assertRegex(figure, r"missing up to 1\xa0% of the pairs|no approximate contestant")
             self.assertEqual(figure.count('<svg class="time-error" '), 4)
             self.assertEqual(len(re.findall(r"</svg><figcaption>[^<]{30,}\.</figcaption>", figure)), 4)
             # A blank line would end raw HTML for no reader of Sphinx, but a fence inside of it would.

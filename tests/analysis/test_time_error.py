@@ -88,7 +88,7 @@ class TestTimeError(unittest.TestCase):
         study = self.study(lines)
         (place,) = time_error.places(study)
         (says,) = time_error.sentences(study, place)
-        self.assertRegex(says, r"^If nothing of the future is known, on one scene \(.*, 10 frames a keyframe\): allowing 1\u00a0% missed pairs is 2\.00 times as fast")
+        self.assertRegex(says, r"^If nothing of the future is known, on one scene \(.*, 10 frames a keyframe\): missing up to 1\u00a0% of the pairs makes a frame 2\.00 times as fast")
         self.assertIn("good takes 1.00\u00a0ms a frame and missed 0.90\u00a0%", says)
         self.assertTrue(says.endswith("; the fastest exact one, refit, takes 2.00\u00a0ms a frame."), says)
         self.assertNotIn("gains nothing", says)
@@ -96,7 +96,7 @@ class TestTimeError(unittest.TestCase):
     def test_where_an_error_buys_nothing_it_says_so(self) -> None:
         study = self.study([exact("refit", 1.0), wrong("good", 1.5, 1), wrong("bad", 0.5, 500)])
         (place,) = time_error.places(study)
-        self.assertRegex(time_error.sentences(study, place)[0], r"allowing 1\u00a0% missed pairs gains nothing: the fastest exact one, refit, takes 1\.00\u00a0ms a frame and is 1\.50 times as fast")
+        self.assertRegex(time_error.sentences(study, place)[0], r"missing up to 1\u00a0% of the pairs gains nothing: the fastest exact one, refit, takes 1\.00\u00a0ms a frame and is 1\.50 times as fast")
         study = self.study([exact("refit", 1.0), wrong("bad", 0.5, 500)])
         (place,) = time_error.places(study)
         self.assertIn("no approximate contestant missed less than 1\u00a0%", time_error.sentences(study, place)[0])
@@ -106,7 +106,7 @@ class TestTimeError(unittest.TestCase):
         study = self.study(lines)
         (place,) = time_error.places(study)
         without, known = time_error.sentences(study, place)
-        self.assertTrue(without.startswith("If nothing") and "is 2.00 times as fast" in without, without)
+        self.assertTrue(without.startswith("If nothing") and "makes a frame 2.00 times as fast" in without, without)
         self.assertTrue(known.startswith("Whatever is known") and "gains nothing" in known and "1.25 times as fast" in known, known)
 
     def test_places_of_marks_follow_time_and_share(self) -> None:

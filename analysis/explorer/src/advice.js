@@ -124,6 +124,11 @@ export function rankedKept(kept, cells, known) {
       disturbed: own.some((cell) => cell.doubtful.includes(id)),
     });
   }
+  if (cells.length === 1)
+    for (const one of found) {
+      const [low, high, isInterval] = cells[0].spans[one.id] ?? [];
+      if (low < high) Object.assign(one, { low, high, isInterval });
+    }
   return found.sort((a, b) => b.speed - a.speed);
 }
 

@@ -341,7 +341,7 @@ await check("time against error opens where contestants err, with missed pairs f
   assert.equal(chosen, wanted);
   assert.ok(others.length > 1 && others.every((text) => text.endsWith(": exact contestants only")), others.join(" | "));
   assert.deepEqual(titles.slice(0, 2), ["Missed pairs", "False pairs"]);
-  assert.match(said[0], /^(If nothing|Whatever is known) .*allowing 1\u202f% missed pairs (is [\d.]+ times as fast|gains nothing: .* and is [\d.]+ times as fast)/);
+  assert.match(said[0], /^(If nothing|Whatever is known) .*missing up to 1\u202f% of the pairs (makes a frame [\d.]+ times as fast|gains nothing: .* and is [\d.]+ times as fast)/);
   assert.ok(said[0].includes("missed 0.40\u202f%"), said[0]);
   // 332 of the 1000 - 4 + 332 reported pairs are false: the share is of what was reported, as in the report.
   await page.waitForFunction(() => document.querySelectorAll("#view .numbers table").length > 1);

@@ -289,7 +289,7 @@ function curve(context, found, order) {
 function cost({ model, choose }, found, best) {
   if (!best) return null;
   const rows = found.cells
-    .toSorted((a, b) => a.cell.place - b.cell.place)
+    .toSorted((a, b) => a.cell.primitives - b.cell.primitives || a.cell.place - b.cell.place)
     .map(({ cell, refit, runs }) => {
       const run = runs.get(best.id);
       const time = (one) => milliseconds(value(model, one, "with_motion"));

@@ -190,8 +190,8 @@ function bargain(model, runs, known) {
   const one = `${few.contestant.label} takes ${ms(few)} and missed ${few.missed ? percent(missedShare(few)) : "nothing here, but promises nothing"}`;
   const other = `the fastest exact one, ${exact.contestant.title}, takes ${ms(exact)}`;
   return (
-    `${known ? "If nothing of the future is known" : "Whatever is known of the future"}, allowing ${percent(FEW, 1)} missed pairs ` +
-    (wins ? `is ${times}: ${one}; ${other}.` : `gains nothing: ${other} and is ${times} as the fastest with errors (${one}).`)
+    `${known ? "If nothing of the future is known" : "Whatever is known of the future"}, missing up to ${percent(FEW, 1)} of the pairs ` +
+    (wins ? `makes a frame ${times}: ${one}; ${other}.` : `gains nothing: ${other} and is ${times} as the fastest with errors (${one}).`)
   );
 }
 

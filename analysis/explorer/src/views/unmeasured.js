@@ -2,7 +2,7 @@
 import { ASKS, FRAMES, KNOWN, SIZES, nearest, rankedKept } from "../advice.js";
 import { tableOf } from "../chart.js";
 import { make } from "../dom.js";
-import { factor, milliseconds, plural, sceneWords, sentence } from "../words.js";
+import { factor, milliseconds, plural, sceneWords, sentence, significant } from "../words.js";
 import { costText, methodText, rangeText, speedText } from "./answer.js";
 
 /** Names classes of l and of sizes. */
@@ -14,7 +14,7 @@ function situation(frames, size) {
 /** The answer card of a choice without measurements; `best` is what the rule takes in the nearest cells of these results. */
 export function unmeasured({ model, state, set }, found, best) {
   const { kept } = model.data;
-  const own = found.kept.length ? rankedKept(kept, found.kept, state.know)[0] : null;
+  const [own, next] = found.kept.length ? rankedKept(kept, found.kept, state.know) : [];
   const largest = found.own.map(({ cell }) => cell).reduce((most, cell) => (most && most.primitives >= cell.primitives ? most : cell), null);
   const above = largest && found.size !== "any" && SIZES[found.size].from > largest.primitives ? ` Nothing above ${largest.size} was.` : "";
   const known = !own && !found.scene ? nearest(found.known.map((cell) => ({ cell })), found.size, found.frames) : null;
@@ -28,23 +28,35 @@ export function unmeasured({ model, state, set }, found, best) {
     { class: "answer", "aria-live": "polite" },
     make("p", { class: "absent-here" }, make("strong", { text: "Not measured in these results: " }), `${ASKS[found.asks] ?? found.asks}, ${scene}${situation(found.frames, found.size)}.${above}`),
     own && [
-      make("p", { class: "take" }, "Take ", make("strong", { text: own.contestant.title }), `: ${rangeText(own.own.map((cell) => [cell.times[own.id], cell]))}.`),
+      make("p", { class: "take" }, "Take ", make("strong", { text: own.contestant.title }), `: ${keptCost(own)}.`),
       make("p", { class: "speed", text: [`That is ${speedText(own)}.`, keptWins(own)].filter(Boolean).join(" ") }),
       methodText(model, own) && make("p", { class: "method", text: methodText(model, own) }),
       make("p", {}, "By the project's own measurements, not by these results. It is called ", make("code", { text: own.id }), " on the command line and in code."),
+      next && make("p", { class: "note", text: `Next: ${next.contestant.title}, ${keptCost(next)}; ${speedText(next)}.` }),
       make("p", { class: "note", text: `Measured: ${kept.told}.` }),
     ],
+    refits &&
+      !own &&
+      make("p", { class: "take" }, "Take ", make("strong", { text: best.contestant.title }), ": a refit uses no keyframes. Its time with positions only is not known."),
     best &&
       make(
         "p",
         { class: own ? "note nearest" : "nearest" },
         "Nearest in these results: ",
         lead(found.near),
-        `. There, where ${KNOWN[state.know].words}, take ${best.contestant.title}: ${costText(model, best)}${best.cells === 1 ? ` on ${best.own[0].cell.title}` : ""}; ${speedText(best)}.${refits ? " A refit uses no keyframes: it can be taken with positions only, too; its time there is not known." : ""}`,
+        `. There, where ${KNOWN[state.know].words}, take ${best.contestant.title}: ${costText(model, best)}${best.cells === 1 ? ` on ${best.own[0].cell.title}` : ""}; ${speedText(best)}.`,
       ),
     other && make("p", { class: "kept-near" }, "The project's own measurements have it with ", lead(other), "."),
     !own && !best && !other && make("p", { text: "Nothing near it was measured, either." }),
   );
+}
+
+/** Tells what a strategy costs in the project's cells, in several of them also per triangle: for sizes between those that were measured. */
+function keptCost(one) {
+  const text = rangeText(one.own.map((cell) => [cell.times[one.id], cell]));
+  const rates = one.own.map((cell) => (1e6 * cell.times[one.id]) / cell.primitives);
+  const [low, high] = [Math.min(...rates), Math.max(...rates)].map((rate) => significant(rate, 2));
+  return low === high ? text : `${text}, ${low} to ${high} ns a triangle`;
 }
 
 /** Tells in how many of the project's cells a strategy beats the best refit, where it is slowest, and whether that is sure; "" of a refit. */
@@ -69,7 +81,7 @@ export function keptCosts({ model, state }, found) {
     const [low, high] = cell.spans[id] ?? [];
     return `${factor(cell.speeds[id])}${cell.doubtful.includes(id) ? "?" : ""}${low < high ? ` (${factor(low)}–${factor(high)})` : ""}`;
   };
-  const rows = found.kept.map((cell) => [
+  const rows = found.kept.toSorted((a, b) => a.primitives - b.primitives || a.l - b.l).map((cell) => [
     cell.title,
     ms(cell, best.id),
     kept.strategies[cell.refit]?.[0] ?? cell.refit,
@@ -80,7 +92,7 @@ export function keptCosts({ model, state }, found) {
     "section",
     {},
     make("h2", { text: "What it costs in the project's own measurements" }),
-    make("p", { class: "note", text: sentence(`${plural(rows.length, "cell")}: a cell is one scene at one size, with l frames from a keyframe to the next; sizes are triangles of both bodies together. In parentheses: the 95\u00a0% interval. ?: measured while the machine was disturbed.`) }),
+    make("p", { class: "note", text: sentence(`${plural(rows.length, "cell")}: a cell is one scene at one size, with l frames from a keyframe to the next; sizes are triangles of both bodies together. In parentheses: the 95\u00a0% interval. ?: measured while the machine was disturbed. Two lines of one cell are of two plans.`) }),
     make("div", { class: "scroll", tabindex: 0 }, tableOf(["scene", `${best.contestant.title}, ms`, "best refit", "ms", "times as fast"], rows)),
   );
 }
