@@ -34,6 +34,10 @@ def choices(study: Study) -> list[Choice]:
     found = []
     timed = study.timed
     titles = dict(zip(map(str, study.runs["id"]), map(str, study.runs["title"])))
+
+    def title(id: re.Match[str]) -> str:
+        return titles.get(id[0], id[0])
+
     for _, rows in timed.groupby("group", sort=False):
         others = rows[(rows["choice"] == "") & (rows["guarantee"] == "exact") & rows["params"].map(_single)]
         for _, row in rows[rows["choice"].str.contains(FRAMES)].iterrows():
@@ -45,7 +49,7 @@ def choices(study: Study) -> list[Choice]:
             found.append(
                 Choice(
                     short(str(row["scene"])), text.size(row["primitives"]), str(row["scalar"]), f"{row['l']:g}", str(row["label"]),
-                    re.sub(r"\w+(?= for \d)", lambda id: titles.get(id[0], id[0]), chosen),
+                    re.sub(r"\w+(?= for \d)", title, chosen),
                     seen.removesuffix(")"), str(best["label"]), float(totals.min() / row[TOTAL].sum()),
                 )  # fmt: skip
             )

@@ -217,8 +217,34 @@ await check("a choice that was not measured stays, is said, and is answered by t
   });
   assert.ok(rule[1] > 3);
   assert.ok((await card()).includes(`Take ${rule[0]}: `), `${rule[0]}: ${await card()}`);
+  assert.match(await card(), / a frame, [\d.]+ to [\d.]+ ns a triangle\./);
+  assert.match(await card(), /Next: .* a frame, [\d.]+ to [\d.]+ ns a triangle; .*Measured: /);
+  // The project's cells stand by size, so that the one that is nearest to a mesh is found without reading all.
+  const sizes = await page.evaluate(() =>
+    [...document.querySelectorAll("#view h2")]
+      .find((one) => one.textContent === "What it costs in the project's own measurements")
+      .closest("section")
+      .querySelector("tbody")
+      .innerText.match(/, [\d.]+[kM]?, l = /g)
+      .map((text) => parseFloat(text.slice(2)) * (text.includes("k") ? 1e3 : text.includes("M") ? 1e6 : 1)),
+  );
+  assert.equal(sizes.length, rule[1]);
+  assert.deepEqual(sizes, sizes.toSorted((a, b) => a - b));
   assert.match(await card(), /By the project's own measurements, not by these results\. .*Measured: plans? .*commit [0-9a-f]{8}, .*Nearest in these results: positions only \(a keyframe at every frame\), below 10k triangles\./);
   await reasons(page);
+
+  // A refit needs no keyframes: where only more frames a keyframe were measured, here of one scene, it is recommended nevertheless.
+  const refit = await page.evaluate(() => {
+    const { model, set } = window.explorer;
+    const [all, before] = [model.counted, { large: "medium", of: "" }];
+    model.counted = all.filter(({ cell }) => cell.l >= 10);
+    set({ large: "any", of: model.counted[0].cell.scene });
+    const told = document.querySelector(".answer").innerText;
+    model.counted = all;
+    set(before);
+    return told;
+  });
+  assert.match(refit, /\nTake ([^:]+): a refit uses no keyframes\. Its time with positions only is not known\.\s+Nearest in these results: 10 frames a keyframe and more\. There, .* take \1: /);
 
   await press(page, "one body with itself, too"); // the project has it for other frames only
   assert.deepEqual(await pressed(page), ["Nothing: positions only", "1", "10k to 100k", "one body with itself, too"]);
