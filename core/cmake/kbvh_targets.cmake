@@ -136,7 +136,7 @@ function(kbvh_add_strategy_targets program)
   kbvh_write_manifest(${manifest} ${names})
   add_executable(${program}_conformance ${kbvh_SHARE_DIR}/tests/conformance/conformance_test.cpp
     ${kbvh_SHARE_DIR}/tests/support/curved_scenes.cpp ${kbvh_SHARE_DIR}/tests/support/geometry_scripts.cpp
-    ${kbvh_SHARE_DIR}/tests/support/synthetic_scenes.cpp
+    ${kbvh_SHARE_DIR}/tests/support/synthetic_names.cpp ${kbvh_SHARE_DIR}/tests/support/synthetic_scenes.cpp
     ${manifest})
   target_include_directories(${program}_conformance PRIVATE ${kbvh_SHARE_DIR})
   target_link_libraries(${program}_conformance PRIVATE ${program}_strategies kbvh::core GTest::gtest
