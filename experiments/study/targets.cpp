@@ -18,8 +18,9 @@ using nlohmann::json;
 
 namespace {
 
-const std::vector<std::string> phases{"motion",     "update", "traversal", "triangle_tests",  "query",
-                                      "candidates", "total",  "upkeep",    "update_per_event"};
+const std::vector<std::string> phases{
+    "motion", "update",           "traversal",          "triangle_tests",   "query", "candidates", "total",
+    "upkeep", "update_per_event", "upkeep_with_motion", "total_with_motion"};
 
 template <class T>
 bool has(const std::vector<T>& list, const T& value) {

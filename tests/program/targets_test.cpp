@@ -114,7 +114,8 @@ TEST(Targets, ErrorsNameFileTargetAndKey) {
   EXPECT_EQ(
       with("/denominator/phase", "lunch"),
       "p.json: targets[0]: denominator: phase: expected one of motion, update, traversal, triangle_tests, "
-      "query, candidates, total, upkeep, update_per_event, got 'lunch'");
+      "query, candidates, total, upkeep, update_per_event, upkeep_with_motion, total_with_motion, got "
+      "'lunch'");
   EXPECT_EQ(with("/over", "all"), "p.json: targets[0]: over: expected worst or geometric_mean, got 'all'");
   EXPECT_EQ(with("/numerator", "bottom_up"),
             "p.json: targets[0]: numerator: expected an object with named members, got \"bottom_up\"");
