@@ -189,8 +189,10 @@ std::size_t StrategyBroadPhase<S>::bytes() const {
   std::size_t total =
       (corners_.capacity() + boxes_.capacity() + begin_points_.capacity() + end_points_.capacity()) *
       sizeof(S);
-  for (const Primitives& list : nets_.lists)
-    total += (list.offsets.capacity() + list.vertices.capacity()) * sizeof(std::uint32_t);
+  for (const Elements* elements : {&elements_, &nets_})
+    for (const Primitives& list : elements->lists)
+      total += (list.offsets.capacity() + list.vertices.capacity()) * sizeof(std::uint32_t);
+  total += filter_.bytes();
   for (const std::unique_ptr<detail::StrategySearch<S>>& search : searches_)
     if (search != nullptr)
       total += search->session.strategy().bytes() + search->pairs.capacity() * sizeof(PrimitivePair);

@@ -73,7 +73,7 @@ class StrategyBroadPhase {
   void clear_filters();
 
   const std::string& strategy() const { return strategy_; }
-  /// Returns the memory of the boxes, the strategy's structures and the lists, in bytes.
+  /// Returns the memory of boxes, elements, filters, the strategy's structures and its lists, in bytes.
   std::size_t bytes() const;
 
  private:

@@ -8,12 +8,7 @@
 #include "experiments/common/text.hpp"
 
 namespace kbvh::experiments::loop {
-namespace {
-
-/// Groups of vertices: those of obstacles pair with others only.
-constexpr GroupMask moving_group{1, ~std::uint32_t(0)}, obstacle_group{2, ~std::uint32_t(2)};
-
-}  // namespace
+namespace {}  // namespace
 
 const char* name(Detection detection) {
   switch (detection) {
@@ -52,10 +47,7 @@ IterateDetector::IterateDetector(const ContactMesh& mesh, const Settings& settin
 void IterateDetector::build(const Positions& x) {
   broad_.build(x, mesh_.edges, mesh_.faces, settings_.radius);
   broad_.remove(Element::vertex, mesh_.inner);
-  std::vector<GroupMask> groups;
-  for (const std::uint8_t obstacle : mesh_.obstacle)
-    groups.push_back(obstacle != 0 ? obstacle_group : moving_group);
-  broad_.set_vertex_groups(groups);
+  broad_.set_vertex_groups(mesh_.vertex_groups());
   if (settings_.lose_every > 0)
     broad_.keep_if([every = settings_.lose_every](CandidateKind kind, const Candidate& pair) {
       return !is_lost(kind, pair, every);

@@ -4,6 +4,7 @@
 
 #include "core/base/hasher.hpp"
 #include "core/broad_phase/elements.hpp"
+#include "core/broad_phase/pair_filter.hpp"
 #include "experiments/loop/simulated_mesh.hpp"
 
 namespace kbvh::experiments::loop {
@@ -24,6 +25,15 @@ struct ContactMesh {
         faces(mesh.faces),
         obstacle(mesh.obstacle),
         inner(mesh.inner) {}
+
+  /// Returns the groups of vertices by which elements of obstacles pair with others only.
+  std::vector<GroupMask> vertex_groups() const {
+    constexpr GroupMask of_moving{1, ~std::uint32_t(0)}, of_obstacle{2, ~std::uint32_t(2)};
+    std::vector<GroupMask> groups;
+    groups.reserve(obstacle.size());
+    for (const std::uint8_t one : obstacle) groups.push_back(one != 0 ? of_obstacle : of_moving);
+    return groups;
+  }
 };
 
 /// Returns whether the seeded fault of tests takes a pair: one of `every`, by its ids.

@@ -72,17 +72,22 @@ StrategyContacts::StrategyContacts(const ContactMesh& mesh, const ContactStrateg
       is_inner_(mesh.vertices, 0),
       broad_(checked_id(strategy, mesh), strategy.params) {
   for (const std::uint32_t vertex : mesh.inner) is_inner_[vertex] = 1;
-  for (const Element element : {Element::vertex, Element::edge, Element::face})
-    for (std::uint32_t id = 0; id < elements_.count(element); ++id) {
-      const auto vertices = elements_.vertices(element, id);
-      const bool obstacle = std::all_of(vertices.begin(), vertices.end(),
-                                        [&](std::uint32_t v) { return mesh.obstacle[v] != 0; });
-      is_obstacle_[std::size_t(element)].push_back(obstacle ? 1 : 0);
-    }
+}
+
+std::size_t StrategyContacts::keep(CandidateKind kind, std::span<Candidate> pairs) const {
+  std::size_t kept = 0;
+  for (const Candidate& pair : pairs) {
+    const bool is_inner = kind == CandidateKind::face_vertex && is_inner_[pair.second] != 0;
+    if (!is_inner && (lose_every_ == 0 || !is_lost(kind, pair, lose_every_))) pairs[kept++] = pair;
+  }
+  return kept;
 }
 
 void StrategyContacts::start(const Positions& x) {
   broad_.build(x, mesh_.edges, mesh_.faces, radius_);
+  broad_.set_vertex_groups(mesh_.vertex_groups());
+  if (lose_every_ > 0 || !mesh_.inner.empty())
+    broad_.keep_only([this](CandidateKind kind, std::span<Candidate> pairs) { return keep(kind, pairs); });
   built_ = true;
   forget_found();
 }
@@ -107,10 +112,6 @@ std::span<const Candidate> StrategyContacts::candidates(CandidateKind kind) {
   CandidateBuffer& found = found_[std::size_t(kind)];
   if (!found_valid_[std::size_t(kind)]) {
     broad_.detect(kind, found);
-    std::size_t kept = 0;
-    for (const Candidate& pair : found)
-      if (may_touch(kind, pair)) found[kept++] = pair;
-    found.resize(kept);
     ++searches_;
     found_valid_[std::size_t(kind)] = true;
   }
@@ -130,7 +131,6 @@ std::size_t StrategyContacts::bytes() const {
   std::size_t total = broad_.bytes() + (begin_.capacity() + end_.capacity()) * sizeof(double);
   for (const Primitives& list : elements_.lists)
     total += (list.offsets.capacity() + list.vertices.capacity()) * sizeof(std::uint32_t);
-  for (const std::vector<std::uint8_t>& flags : is_obstacle_) total += flags.capacity();
   for (const CandidateBuffer& found : found_) total += found.capacity() * sizeof(Candidate);
   return total + is_inner_.capacity();
 }

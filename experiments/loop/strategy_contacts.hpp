@@ -26,13 +26,14 @@ struct ContactStrategy {
 void check_contact_strategy(const ContactStrategy& strategy, const ContactMesh& mesh);
 
 /// The pairs of a mesh that may touch, found by a strategy: the same set as those of BroadPhase, if the
-/// strategy is exact. StrategyBroadPhase has no filters, so pairs of obstacles, and inner vertices, are found
-/// and then left out.
+/// strategy is exact. Pairs of obstacles, and inner vertices, are found and then left out by filters.
 class StrategyContacts {
  public:
   /// Throws as check_contact_strategy. `lose_every`: see IterateDetector::Settings.
   StrategyContacts(const ContactMesh& mesh, const ContactStrategy& strategy, double radius,
                    std::uint32_t lose_every);
+  StrategyContacts(const StrategyContacts&) = delete;
+  StrategyContacts& operator=(const StrategyContacts&) = delete;
 
   /// Takes positions; rows are vertices. The first call builds.
   void update(const Positions& x);
@@ -51,21 +52,15 @@ class StrategyContacts {
 
  private:
   void start(const Positions& x);
-  bool may_touch(CandidateKind kind, const Candidate& pair) const {
-    if (is_obstacle_[std::size_t(first_element(kind))][pair.first] != 0 &&
-        is_obstacle_[std::size_t(second_element(kind))][pair.second] != 0)
-      return false;
-    if (kind == CandidateKind::face_vertex && is_inner_[pair.second] != 0) return false;
-    return lose_every_ == 0 || !is_lost(kind, pair, lose_every_);
-  }
+  /// Moves the pairs that may touch, and that the fault of tests leaves, to the front; returns their number.
+  std::size_t keep(CandidateKind kind, std::span<Candidate> pairs) const;
   void forget_found() { found_valid_.fill(false); }
 
   const ContactMesh& mesh_;
   double radius_;
   std::uint32_t lose_every_;
   Elements elements_;
-  std::array<std::vector<std::uint8_t>, element_kinds> is_obstacle_;  // [Element][id]
-  std::vector<std::uint8_t> is_inner_;                                // [vertex]
+  std::vector<std::uint8_t> is_inner_;  // [vertex]
   StrategyBroadPhase<double> broad_;
   bool built_ = false, moves_ = false;
   std::vector<double> begin_, end_;  // [vertex][4], of the last motion

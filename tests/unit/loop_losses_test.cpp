@@ -10,6 +10,7 @@
 #include "core/contract/registry.hpp"
 #include "core/families/wide/stored_hierarchy.hpp"
 #include "experiments/loop/simulation.hpp"
+#include "loop_simulator.hpp"
 
 namespace kbvh {
 namespace loop_losses_test {
@@ -110,11 +111,8 @@ std::string_view about(std::string_view /*id*/) {
 namespace experiments::loop {
 namespace loop_losses_test {
 
-SimulationOptions small(const std::string& scene, const std::string& strategy) {
-  SimulationOptions options;
-  options.scene = scene;
-  options.triangles = scene == "stack" ? 144 : 200;
-  options.steps = 100;
+SimulationOptions by(const std::string& scene, const std::string& strategy) {
+  SimulationOptions options = small(scene, 100);
   options.strategy.id = strategy;
   return options;
 }
@@ -122,14 +120,14 @@ SimulationOptions small(const std::string& scene, const std::string& strategy) {
 class LossesInEveryScene : public testing::TestWithParam<std::string> {};
 
 TEST_P(LossesInEveryScene, ArePenetrations) {
-  EXPECT_EQ(simulate(small(GetParam(), "sound")).penetrations, 0u);
-  const SimulationResult all = simulate(small(GetParam(), "loses_all"));
+  EXPECT_EQ(simulate(by(GetParam(), "sound")).penetrations, 0u);
+  const SimulationResult all = simulate(by(GetParam(), "loses_all"));
   EXPECT_GT(all.penetrations, 0u);
   EXPECT_GT(all.first_penetration, 0u);
-  const SimulationResult third = simulate(small(GetParam(), "loses_a_third"));
+  const SimulationResult third = simulate(by(GetParam(), "loses_a_third"));
   EXPECT_GT(third.penetrations, 0u);
   // The default finder, with the same fault, loses the same pairs.
-  SimulationOptions options = small(GetParam(), "");
+  SimulationOptions options = by(GetParam(), "");
   options.lose_every = 3;
   const SimulationResult expected = simulate(options);
   EXPECT_EQ(hash_of_state(third.state), hash_of_state(expected.state));
@@ -143,9 +141,9 @@ INSTANTIATE_TEST_SUITE_P(Scenes, LossesInEveryScene, testing::Values("sphere", "
 /// already too near when it was found. (Slow contacts outlive such losses: the next question comes in time.)
 TEST(Losses, ThatComeAndGoAreSeen) {
   std::uint64_t last = 0;
-  const SimulationResult result =
-      simulate(small("sphere", "loses_at_times"),
-               [&](const nlohmann::json& record) { last = record["step"].get<std::uint64_t>(); });
+  const SimulationResult result = simulate(by("sphere", "loses_at_times"), [&](const nlohmann::json& record) {
+    last = record["step"].get<std::uint64_t>();
+  });
   EXPECT_TRUE(result.penetrations > 0 || result.too_near);
   EXPECT_EQ(result.state.step, last);
   EXPECT_EQ(result.too_near, result.state.step < 100);

@@ -9,6 +9,7 @@
 
 #include "experiments/loop/implicit_step.hpp"
 #include "experiments/loop/penetration.hpp"
+#include "experiments/loop/simulation.hpp"
 
 namespace kbvh::experiments::loop {
 
@@ -33,6 +34,15 @@ struct Simulator {
   ImplicitStep step;
   State state;
 };
+
+/// A scene in a size that takes a test some seconds.
+inline SimulationOptions small(const std::string& scene, std::uint64_t steps) {
+  SimulationOptions options;
+  options.scene = scene;
+  options.triangles = scene == "stack" ? 144 : 200;
+  options.steps = steps;
+  return options;
+}
 
 inline std::vector<nlohmann::json> lines_of(const std::filesystem::path& file) {
   std::vector<nlohmann::json> lines;

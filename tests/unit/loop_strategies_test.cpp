@@ -21,14 +21,6 @@ namespace loop_strategies_test {
 
 using nlohmann::json;
 
-SimulationOptions small(const std::string& scene, std::uint64_t steps) {
-  SimulationOptions options;
-  options.scene = scene;
-  options.triangles = scene == "stack" ? 144 : 200;
-  options.steps = steps;
-  return options;
-}
-
 /// The state after each step, and the sum of the candidates of its questions.
 struct Trajectory {
   std::vector<std::string> states;

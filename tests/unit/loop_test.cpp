@@ -24,14 +24,6 @@ namespace loop_test {
 using kbvh::test::Random;
 using nlohmann::json;
 
-SimulationOptions small(const std::string& scene, std::uint64_t steps) {
-  SimulationOptions options;
-  options.scene = scene;
-  options.triangles = scene == "stack" ? 144 : 200;
-  options.steps = steps;
-  return options;
-}
-
 class EveryScene : public testing::TestWithParam<std::string> {};
 
 TEST_P(EveryScene, HasNoPenetrationInTwoHundredSteps) {

@@ -102,7 +102,7 @@ class AlgebraicClock {
     const double error = a.error + b.error;
     if (a.hint + error < b.hint) return -1;
     if (b.hint + error < a.hint) return 1;
-    if (error == 0) return 0;  // both at the beginning of a segment
+    if (error == 0) return 0;  // equal, and both exact, as at the beginning of a segment
     const bool curved_a = on_curves(a.body), curved_b = on_curves(b.body);
     if (!curved_a && !curved_b) return lines_.compare_times(a, b);
     if (!curved_a) return -compare_moment_to(moment_of(b), lines_.crossing(a));
