@@ -36,6 +36,7 @@ class Run(unittest.TestCase):
         for name, code in {**SOUND, **{name.replace("__", "-"): code for name, code in programs.items()}}.items():
             file = self.root / next((known for known in SOUND if known.endswith("/" + name)), name)
             file.parent.mkdir(parents=True, exist_ok=True)
+            file.unlink(missing_ok=True)  # the last play may still run it, and such a file cannot be written
             file.write_text(f"#!/bin/bash\n{code}\n")
             file.chmod(0o755)
         shutil.copy(paths.HERE.parents[1] / "tests" / "run", self.root / "tests" / "run")
