@@ -84,9 +84,7 @@ class DopHierarchy {
   }
 
  private:
-  static constexpr std::size_t padded = padded_sides(K), half = padded / 2, corners_each = 8;
-
-  void place_corners(const S* positions);
+  static constexpr std::size_t padded = padded_sides(K), half = padded / 2;
 
   const DopKernels<S>* kernels_;
   Topology topology_;

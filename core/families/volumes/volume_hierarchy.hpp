@@ -21,6 +21,36 @@ enum class Cover : std::uint8_t {
   boxes,     ///< its axis-aligned box, for pairs of which only the boxes are compared
 };
 
+/// The corners of a primitive's box.
+inline constexpr std::uint32_t corners_each = 8;
+
+/// Lists the points that the volumes of leaves must contain: vertices, or corners of boxes, numbered as
+/// `place_corners` writes them.
+inline LeafVertices points_of_leaves(const Topology& topology, const Primitives& primitives, Cover cover) {
+  if (cover == Cover::vertices) return unique_leaf_vertices(topology, primitives);
+  LeafVertices result;
+  result.offsets.push_back(0);
+  for (const TopologyNode& node : topology.nodes) {
+    if (node.is_leaf())
+      for (std::uint32_t k = node.first(); k < node.first() + node.count(); ++k)
+        for (std::uint32_t corner = 0; corner < corners_each; ++corner)
+          result.vertices.push_back(corners_each * topology.primitives[k] + corner);
+    result.offsets.push_back(std::uint32_t(result.vertices.size()));
+  }
+  return result;
+}
+
+/// Writes the corners of the boxes of a topology's primitives: [primitive][8][3].
+template <class S>
+void place_corners(const Topology& topology, const Primitives& primitives, const S* positions, S* corners) {
+  for (const std::uint32_t primitive : topology.primitives) {
+    const Box<S> box = primitive_box(primitives[primitive], positions);
+    S* out = corners + std::size_t(3) * corners_each * primitive;
+    for (std::size_t corner = 0; corner < corners_each; ++corner)
+      for (std::size_t d = 0; d < 3; ++d) *out++ = (corner >> d) & 1 ? box.upper[d] : box.lower[d];
+  }
+}
+
 /// The hierarchy of one body that stores a bounding volume of any kind per node. The topology may have any
 /// width and may be rotated at run time.
 template <BoundingVolume V>
@@ -124,7 +154,6 @@ class VolumeHierarchy {
     const V& operator()(std::uint32_t node) const { return hierarchy.volume(node); }
     const VolumeHierarchy& hierarchy;
   };
-  static constexpr std::size_t corners_each = 8;
   struct Range {
     std::uint32_t begin = 0, end = 0;
   };
