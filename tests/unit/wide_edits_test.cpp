@@ -58,7 +58,7 @@ class Edited {
     return leaves;
   }
 
-  enum class Op : std::uint8_t { exchange, swap, regrow };
+  enum class Op : std::uint8_t { exchange, regrow };
   /// Edits at random nodes; returns false if the edit is not possible there.
   bool edit(Op op) {
     const std::uint32_t a = any_node(), b = any_node();
@@ -70,12 +70,9 @@ class Edited {
       return true;
     }
     if (is_above(a, b) || is_above(b, a)) return false;
-    hierarchy().edit([&](Topology& topology, TopologyEdit& edit) {
-      op == Op::swap ? swap_.swap(topology, a, b, edit) : swap_.exchange(topology, a, b, edit);
-    });
-    if (op == Op::exchange)
-      for (const std::uint32_t node : {a, b})
-        if (topology().nodes[node].is_leaf()) editor_->placed(topology(), node);
+    hierarchy().edit([&](Topology& topology, TopologyEdit& edit) { swap_.exchange(topology, a, b, edit); });
+    for (const std::uint32_t node : {a, b})
+      if (topology().nodes[node].is_leaf()) editor_->placed(topology(), node);
     return true;
   }
   void refit_edited() { hierarchy().refit_edited(positions()); }
@@ -182,7 +179,6 @@ TEST_P(WideEdits, EqualARemadeLayoutInFloat) {
   using Op = Edited<float>::Op;
   edit_at_random<float>(config(), {Op::exchange});
   edit_at_random<float>(config(), {Op::exchange, Op::regrow});
-  if (config().width == 2) edit_at_random<float>(config(), {Op::swap});
 }
 TEST_P(WideEdits, EqualARemadeLayoutInDouble) {
   using Op = Edited<double>::Op;

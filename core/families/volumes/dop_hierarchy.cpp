@@ -1,5 +1,6 @@
 #include "core/families/volumes/dop_hierarchy.hpp"
 
+#include <algorithm>
 #include <array>
 
 namespace kbvh {

@@ -1,5 +1,7 @@
 #include "core/families/volumes/obb_hierarchy.hpp"
 
+#include <algorithm>
+
 #include "core/families/volumes/obb_triples.hpp"
 
 namespace kbvh {

@@ -1,5 +1,6 @@
 #include "core/families/volumes/sphere_hierarchy.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace kbvh {

@@ -47,8 +47,6 @@ class SphereHierarchy : public LaneVolumes<S, SphereLayout<S>> {
   void assign(Topology topology, const Primitives& primitives);
   /// Computes all spheres from positions [vertex][3], readable up to one scalar past the end.
   void refit(const S* positions);
-  /// Does nothing: the topology stays as assigned.
-  void restore() {}
 
   std::size_t bytes() const { return Base::bytes() + boxes_.capacity() * sizeof(S); }
 
