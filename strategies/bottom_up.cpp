@@ -22,11 +22,8 @@ std::vector<std::string> kernel_words() {
 }
 
 template <class S>
-class BottomUp final : public StoredHierarchyStrategy<S>,
-                       public AnswersSelfPairs,
-                       public AnswersSweeps<S>,
-                       public TakesGeometryChanges<S> {
-  using Base = StoredHierarchyStrategy<S>;
+class BottomUp final : public EditedHierarchyStrategy<S>, public AnswersSweeps<S> {
+  using Base = EditedHierarchyStrategy<S>;
 
  public:
   static constexpr Foresight foresight = Foresight::none;
@@ -75,10 +72,6 @@ class BottomUp final : public StoredHierarchyStrategy<S>,
 
   std::size_t bytes() const override {
     return Base::bytes() + shared_refit_.bytes() + shared_query_.bytes() + shared_confirmation_.bytes();
-  }
-
-  void follow_geometry(double /*t*/, const GeometryChange<S>& change) override {
-    this->edit_geometry(change);
   }
 
   void find_swept_pairs(double /*t0*/, double /*t1*/, std::span<const S* const> before,

@@ -20,10 +20,8 @@ namespace kbvh {
 namespace {
 
 template <class S>
-class FrontTracking final : public StoredHierarchyStrategy<S>,
-                            public AnswersSelfPairs,
-                            public TakesGeometryChanges<S> {
-  using Base = StoredHierarchyStrategy<S>;
+class FrontTracking final : public EditedHierarchyStrategy<S> {
+  using Base = EditedHierarchyStrategy<S>;
 
  public:
   static constexpr Foresight foresight = Foresight::none;
@@ -32,9 +30,6 @@ class FrontTracking final : public StoredHierarchyStrategy<S>,
   void reset_to(double t) override {
     Base::reset_to(t);
     front_.clear();
-  }
-  void follow_geometry(double /*t*/, const GeometryChange<S>& change) override {
-    this->edit_geometry(change);
   }
   QueryStatus find_candidates(double /*t*/, PairBuffer& out, const Budget& budget) override {
     QueryStatus status;

@@ -17,10 +17,8 @@ namespace kbvh {
 namespace {
 
 template <class S>
-class Rotations final : public StoredHierarchyStrategy<S>,
-                        public AnswersSelfPairs,
-                        public TakesGeometryChanges<S> {
-  using Base = StoredHierarchyStrategy<S>;
+class Rotations final : public EditedHierarchyStrategy<S> {
+  using Base = EditedHierarchyStrategy<S>;
 
  public:
   static constexpr Foresight foresight = Foresight::none;
@@ -35,9 +33,6 @@ class Rotations final : public StoredHierarchyStrategy<S>,
   void reset_to(double t) override {
     Base::reset_to(t);
     for (auto& settled : settled_) std::fill(settled.begin(), settled.end(), S(0));
-  }
-  void follow_geometry(double /*t*/, const GeometryChange<S>& change) override {
-    this->edit_geometry(change);
   }
 
   std::size_t bytes() const override {

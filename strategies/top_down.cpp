@@ -9,10 +9,8 @@ namespace kbvh {
 namespace {
 
 template <class S>
-class TopDown final : public StoredHierarchyStrategy<S>,
-                      public AnswersSelfPairs,
-                      public TakesGeometryChanges<S> {
-  using Base = StoredHierarchyStrategy<S>;
+class TopDown final : public EditedHierarchyStrategy<S> {
+  using Base = EditedHierarchyStrategy<S>;
 
  public:
   static constexpr Foresight foresight = Foresight::none;
@@ -22,10 +20,6 @@ class TopDown final : public StoredHierarchyStrategy<S>,
         ranges_(scene.body_count()),
         reads_(scene.body_count()) {
     for (std::uint32_t body = 0; body < scene.body_count(); ++body) topology_changed(body);
-  }
-
-  void follow_geometry(double /*t*/, const GeometryChange<S>& change) override {
-    this->edit_geometry(change);
   }
 
  private:

@@ -28,10 +28,8 @@ std::optional<Topology> over_clip(const SceneView<S>& scene, const ClipMotion<S>
 }
 
 template <class S>
-class Tsah final : public StoredHierarchyStrategy<S>,
-                   public AnswersSelfPairs,
-                   public TakesGeometryChanges<S> {
-  using Base = StoredHierarchyStrategy<S>;
+class Tsah final : public EditedHierarchyStrategy<S> {
+  using Base = EditedHierarchyStrategy<S>;
 
  public:
   static constexpr Foresight foresight = Foresight::whole_clip;
@@ -48,10 +46,6 @@ class Tsah final : public StoredHierarchyStrategy<S>,
         hierarchy.assign(std::move(*topology), this->scene_.primitives(body), hierarchy.kernels());
     }
     Base::reset_to(t);
-  }
-
-  void follow_geometry(double /*t*/, const GeometryChange<S>& change) override {
-    this->edit_geometry(change);
   }
 
  private:

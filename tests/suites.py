@@ -4,7 +4,8 @@
 usage: suites.py [--shuffle SEED] BUILD [CTEST OPTION...]
 
 The options choose tests as ctest does (-L, -LE, -R, -E). Suites run side by side, those first that took longest in this
-build before; with --shuffle in a random order, and so do the cases of each. A case that fails is printed with what its executable said. Exit code 1 if any failed.
+build before, or have the largest property COST; with --shuffle in a random order, and so do the cases of each. A case that
+fails is printed with what its executable said. Exit code 1 if any failed.
 """
 import concurrent.futures
 import json
@@ -29,7 +30,7 @@ def registered(build, options):
 
 
 def batches(tests):
-    """Groups cases of one GoogleTest suite: [(name, number of cases, command, environment, folder, expected output, seconds)]."""
+    """Groups cases of one GoogleTest suite: [(name, number of cases, command, environment, folder, expected output, limit, cost)]."""
     groups = {}
     for test in tests:
         properties = {p["name"]: p["value"] for p in test.get("properties", [])}
@@ -41,10 +42,11 @@ def batches(tests):
         suite = test["name"] if case is None else case.rpartition(".")[0]
         key = (tuple(rest), environment, folder, suite)
         limit = max(properties.get("TIMEOUT", 0), SHORTEST_LIMIT)
-        groups.setdefault(key, (test["name"], [], properties.get("PASS_REGULAR_EXPRESSION", ()), limit))[1].append(case)
-    for (command, environment, folder, suite), (name, cases, expected, limit) in groups.items():
+        settings = properties.get("PASS_REGULAR_EXPRESSION", ()), limit, properties.get("COST", 0)
+        groups.setdefault(key, (test["name"], [], *settings))[1].append(case)
+    for (command, environment, folder, suite), (name, cases, *settings) in groups.items():
         if cases == [None]:
-            yield name, 1, list(command), environment, folder, expected, limit
+            yield name, 1, list(command), environment, folder, *settings
             continue
         filters = [""]
         for case in cases:
@@ -53,11 +55,16 @@ def batches(tests):
             filters[-1] += (":" if filters[-1] else "") + case
         for part in filters:
             yield (f"{os.path.basename(command[0])} {suite}", part.count(":") + 1,
-                   [*command, "--gtest_brief=1", "--gtest_filter=" + part], environment, folder, expected, limit)
+                   [*command, "--gtest_brief=1", "--gtest_filter=" + part], environment, folder, *settings)
+
+
+def in_order(work, before):
+    """The batches, the longest first: by seconds of an earlier run {name: seconds} or else the property COST, then by cases."""
+    return sorted(work, key=lambda batch: (-before.get(batch[0], batch[-1]), -batch[1]))
 
 
 def run(batch):
-    name, count, command, environment, folder, expected, limit = batch
+    name, count, command, environment, folder, expected, limit, _ = batch
     variables = {**os.environ, **dict(entry.split("=", 1) for entry in environment)}
     begin = time.monotonic()
     try:
@@ -84,7 +91,7 @@ def main():
     if os.path.exists(past):
         with open(past) as file:
             before = json.load(file)
-    work = sorted(batches(registered(build, options)), key=lambda batch: (-before.get(batch[0], 0), -batch[1]))
+    work = in_order(batches(registered(build, options)), before)
     if seed is not None:
         random.Random(seed).shuffle(work)
         os.environ.update(GTEST_SHUFFLE="1", GTEST_RANDOM_SEED=str(seed % 99999 + 1))

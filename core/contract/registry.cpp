@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "core/motion/admissible.hpp"
 #include "core/scene/self_pairs.hpp"
@@ -95,6 +96,65 @@ std::string unsuitable_bodies(const Info& info, const Scene<S>& scene) {
       if (std::string where = beyond_range(info, body); !where.empty()) return where;
   }
   return {};
+}
+
+const char* name(Tightness tightness) {
+  switch (tightness) {
+    case Tightness::tight:
+      return "tight";
+    case Tightness::conservative:
+      return "conservative";
+    case Tightness::none:
+      break;
+  }
+  return "none";
+}
+
+const char* name(Guarantee guarantee) {
+  switch (guarantee) {
+    case Guarantee::exact:
+      return "exact";
+    case Guarantee::candidate_superset:
+      return "candidate_superset";
+    case Guarantee::approximate:
+      break;
+  }
+  return "approximate";
+}
+
+const char* name(Foresight foresight) {
+  switch (foresight) {
+    case Foresight::step_bound:
+      return "step_bound";
+    case Foresight::next_keyframe:
+      return "next_keyframe";
+    case Foresight::whole_clip:
+      return "whole_clip";
+    case Foresight::none:
+      break;
+  }
+  return "none";
+}
+
+std::vector<std::string> names(const Capabilities& can) {
+  const std::pair<bool, const char*> all[] = {{can.event_driven, "event_driven"},
+                                              {can.events, "events"},
+                                              {can.continuous, "continuous"},
+                                              {can.restructures, "restructures"},
+                                              {can.plan_changes, "plan_changes"},
+                                              {can.geometry_changes, "geometry_changes"},
+                                              {can.spans, "spans"},
+                                              {can.self_pairs, "self_pairs"},
+                                              {can.time_budget, "time_budget"},
+                                              {can.contacts, "contacts"},
+                                              {can.changes, "changes"},
+                                              {can.rays, "rays"},
+                                              {can.probes, "within"},
+                                              {can.curves, "curves"}};
+  std::vector<std::string> words;
+  for (const auto& [has, word] : all)
+    if (has) words.emplace_back(word);
+  return words;
 }
 
 template <class S>

@@ -108,6 +108,13 @@ BuilderConfig suitable_builder(const Info& info, std::optional<BuildMethod> meth
 template <class S>
 std::string unsuitable_bodies(const Info& info, const Scene<S>& scene);
 
+/// Return the words of result files and of the facade.
+const char* name(Tightness tightness);
+const char* name(Guarantee guarantee);
+const char* name(Foresight foresight);
+/// Returns the names of the capabilities that are there.
+std::vector<std::string> names(const Capabilities& can);
+
 /// Builds the topologies of all bodies from the positions at the playback's current time.
 template <class S>
 Topologies build_topologies(const SceneView<S>& scene, Playback<S>& playback, const BuilderConfig& config);

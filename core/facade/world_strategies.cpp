@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <utility>
 
 #include "core/contract/about.hpp"
@@ -5,55 +6,6 @@
 #include "core/facade/world.hpp"
 
 namespace kbvh {
-namespace {
-
-const char* words(Foresight foresight) {
-  switch (foresight) {
-    case Foresight::none:
-      return "none";
-    case Foresight::step_bound:
-      return "step bound";
-    case Foresight::next_keyframe:
-      return "next keyframe";
-    case Foresight::whole_clip:
-      return "whole clip";
-  }
-  return "";
-}
-
-const char* words(Guarantee guarantee) {
-  return guarantee == Guarantee::exact                ? "exact"
-         : guarantee == Guarantee::candidate_superset ? "candidate_superset"
-                                                      : "approximate";
-}
-const char* words(Tightness tightness) {
-  return tightness == Tightness::tight          ? "tight"
-         : tightness == Tightness::conservative ? "conservative"
-                                                : "none";
-}
-
-std::vector<std::string> words(const Capabilities& can) {
-  const std::pair<bool, const char*> all[] = {{can.event_driven, "event_driven"},
-                                              {can.events, "events"},
-                                              {can.continuous, "continuous"},
-                                              {can.restructures, "restructures"},
-                                              {can.plan_changes, "plan_changes"},
-                                              {can.geometry_changes, "geometry_changes"},
-                                              {can.spans, "spans"},
-                                              {can.self_pairs, "self_pairs"},
-                                              {can.time_budget, "time_budget"},
-                                              {can.contacts, "contacts"},
-                                              {can.rays, "rays"},
-                                              {can.probes, "within"},
-                                              {can.changes, "changes"},
-                                              {can.curves, "curves"}};
-  std::vector<std::string> out;
-  for (const auto& [has, word] : all)
-    if (has) out.push_back(word);
-  return out;
-}
-
-}  // namespace
 
 std::vector<std::string> World::strategies() {
   std::vector<std::string> ids;
@@ -71,8 +23,9 @@ std::vector<WorldStrategy> World::strategy_descriptions() {
   for (const StrategyEntry& entry : registry()) {
     const Info& info = entry.info;
     WorldStrategy& made = all.emplace_back();
-    made = {
-        info.id, info.title, info.family, info.citation, std::string(about(info.id)), words(info.foresight)};
+    std::string foresight = name(info.foresight);
+    std::replace(foresight.begin(), foresight.end(), '_', ' ');
+    made = {info.id, info.title, info.family, info.citation, std::string(about(info.id)), foresight};
     made.tight = info.tightness == Tightness::tight;
     made.exact = info.guarantee == Guarantee::exact;
     made.events = info.can.events;
@@ -88,9 +41,9 @@ std::vector<WorldStrategy> World::strategy_descriptions() {
                                  parameter.meaning, parameter.allowed, parameter.least, parameter.most,
                                  parameter.numbers == Numbers::whole});
     made.baseline = info.baseline;
-    made.guarantee = words(info.guarantee);
-    made.tightness = words(info.tightness);
-    made.abilities = words(info.can);
+    made.guarantee = name(info.guarantee);
+    made.tightness = name(info.tightness);
+    made.abilities = names(info.can);
     for (const PrimitiveKind kind : info.primitives) made.primitives.push_back(name(kind));
     made.max_primitive_pairs = info.max_primitive_pairs;
     made.max_coordinate = info.max_coordinate;

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
-#include <string>
 
 #include "core/base/assert.hpp"
 
@@ -56,11 +54,7 @@ void TopologyEditor::free_entries(const Topology& topology, std::uint32_t first)
 }
 
 void TopologyEditor::move(Topology& topology, std::uint32_t from, std::uint32_t to) {
-  put(topology, topology.nodes[from], to);
-}
-
-void TopologyEditor::put(Topology& topology, TopologyNode content, std::uint32_t to) {
-  topology.nodes[to] = content;
+  const TopologyNode content = topology.nodes[to] = topology.nodes[from];
   for (std::uint32_t k = content.first(); k < content.first() + content.count(); ++k)
     if (content.is_leaf())
       leaf_of_[topology.primitives[k]] = to;
@@ -178,46 +172,6 @@ void TopologyEditor::take_out(Topology& topology, std::uint32_t node, TopologyEd
   vacate(siblings.first());
   vacate(last);
   free_pairs_.push_back(siblings.first());
-}
-
-void TopologyEditor::move_beside(Topology& topology, std::uint32_t node, std::uint32_t target,
-                                 TopologyEdit& edit) {
-  const auto check = [&](bool holds, const std::string& what) {
-    if (!holds)
-      throw std::invalid_argument("cannot move node " + std::to_string(node) + " next to node " +
-                                  std::to_string(target) + ": " + what);
-  };
-  for (const std::uint32_t id : {node, target})
-    check(id < topology.size() && topology.parents[id] < topology.size(), std::to_string(id) + " is no node");
-  for (std::uint32_t above = target; above != 0 || node == 0; above = topology.parents[above])
-    check(above != node && node != 0, "it would lie below itself");
-  const std::uint32_t parent = topology.parents[node];
-  check(topology.nodes[parent].count() > 2 || (target != parent && topology.parents[target] != parent),
-        "it lies there");
-
-  edit.clear();
-  topology.perfect = false;
-  const TopologyNode content = topology.nodes[node];
-  edit.vacated.push_back(node);
-  take_out(topology, node, edit);
-  const auto sibling = std::find_if(edit.moved.begin(), edit.moved.end(),
-                                    [&](const auto& move) { return move.from == target; });
-  const std::uint32_t place = sibling == edit.moved.end() ? target : sibling->to, pair = new_pair(topology);
-  if (sibling == edit.moved.end())
-    edit.moved.push_back({target, pair});
-  else
-    sibling->to = pair;
-  edit.moved.push_back({node, pair + 1});
-  edit.changed.push_back(place);
-  move(topology, place, pair);
-  put(topology, content, pair + 1);
-  topology.nodes[place] = TopologyNode::inner(pair, 2);
-  for (std::uint32_t child = pair; child < pair + 2; ++child) {
-    topology.parents[child] = place;
-    topology.depths[child] = below(topology.depths[place]);
-    edit.fresh.push_back(child);
-    set_depths_below(topology, child, open_);
-  }
 }
 
 void TopologyEditor::placed(const Topology& topology, std::uint32_t leaf) {

@@ -56,13 +56,6 @@ class TopologyEditor {
   /// Removes a primitive from its leaf.
   void remove(Topology& topology, std::uint32_t primitive, TopologyEdit& edit);
 
-  /// Moves the subtree at a node next to `target`: a new node with both as children takes the place of
-  /// `target`, which may be any node outside the subtree (reinsertion; Bittner et al. 2013). Leaves keep
-  /// their primitives. Throws std::invalid_argument and changes nothing if an id is unused, if `target` lies
-  /// in the subtree, if the two have a parent without other children, or if one of them is that parent.
-  /// O(width + depth), and the two subtrees, whose depths are corrected.
-  void move_beside(Topology& topology, std::uint32_t node, std::uint32_t target, TopologyEdit& edit);
-
   /// Returns the lowest node above a primitive that is unbalanced: one child has more than 1/sqrt(2) of its
   /// leaves. Returns `none` unless the primitive's leaf lies deeper than 2 log2(leaves), where such a node
   /// must exist (Galperin & Rivest 1993). Call it again after `rebalance`: removals may have left several
@@ -85,8 +78,7 @@ class TopologyEditor {
   void placed(const Topology& topology, std::uint32_t leaf);
 
   std::size_t bytes() const {
-    return (leaf_of_.capacity() + free_pairs_.capacity() + free_entries_.capacity() + open_.capacity()) *
-           sizeof(std::uint32_t);
+    return (leaf_of_.capacity() + free_pairs_.capacity() + free_entries_.capacity()) * sizeof(std::uint32_t);
   }
 
  private:
@@ -99,7 +91,6 @@ class TopologyEditor {
   std::uint32_t new_entries(Topology& topology);
   void free_entries(const Topology& topology, std::uint32_t first);
   void move(Topology& topology, std::uint32_t from, std::uint32_t to);
-  void put(Topology& topology, TopologyNode content, std::uint32_t to);
   void take_out(Topology& topology, std::uint32_t node, TopologyEdit& edit);
   static void collect(const Topology& topology, std::uint32_t node, std::vector<PlacedLeaf>& leaves);
   void rebuild(Topology& topology, std::uint32_t node, std::span<PlacedLeaf> leaves, TopologyEdit& edit);
@@ -110,7 +101,6 @@ class TopologyEditor {
   std::uint32_t packed_entries_;             ///< entries as built; blocks of `leaf_size` follow
   std::vector<std::uint32_t> free_pairs_;    ///< first ids of pairs of nodes
   std::vector<std::uint32_t> free_entries_;  ///< first entries of blocks
-  std::vector<std::uint32_t> open_;
 };
 
 /// Returns the leaf at which to insert a box: starts from the root and always takes the child whose surface

@@ -30,27 +30,6 @@ std::vector<std::string> scalars_of(const Info& info) {
   return scalars;
 }
 
-std::vector<std::string> capabilities_of(const Info& info) {
-  const std::pair<bool, const char*> all[] = {{info.can.event_driven, "event_driven"},
-                                              {info.can.events, "events"},
-                                              {info.can.continuous, "continuous"},
-                                              {info.can.restructures, "restructures"},
-                                              {info.can.plan_changes, "plan_changes"},
-                                              {info.can.geometry_changes, "geometry_changes"},
-                                              {info.can.spans, "spans"},
-                                              {info.can.self_pairs, "self_pairs"},
-                                              {info.can.time_budget, "time_budget"},
-                                              {info.can.contacts, "contacts"},
-                                              {info.can.changes, "changes"},
-                                              {info.can.rays, "rays"},
-                                              {info.can.probes, "within"},
-                                              {info.can.curves, "curves"}};
-  std::vector<std::string> words;
-  for (const auto& [can, word] : all)
-    if (can) words.push_back(word);
-  return words;
-}
-
 std::vector<std::string> primitives_of(const Info& info) {
   std::vector<std::string> words;
   for (const PrimitiveKind kind : info.primitives) words.push_back(name(kind));
@@ -78,12 +57,12 @@ json strategy_json(const Info& info) {
                 {"preferred", in_words(info.topology.preferred)}};
   json strategy = about_strategy(info);
   strategy.update(
-      {{"rays_guarantee", word(info.rays_guarantee)},
+      {{"rays_guarantee", name(info.rays_guarantee)},
        {"positions", info.positions == PositionUse::all       ? "all"
                      : info.positions == PositionUse::fetched ? "fetched"
                                                               : "varying"},
        {"scalars", scalars_of(info)},
-       {"capabilities", capabilities_of(info)},
+       {"capabilities", names(info.can)},
        {"primitives", primitives_of(info)},
        {"parameters", parameters},
        {"topology", topology},
@@ -126,10 +105,10 @@ void print_strategy(const Info& info) {
   std::string text = fmt::format("{}: {} ({})\n", info.id, info.title, info.citation);
   text += wrapped(about(info.id), "    ");
   text +=
-      fmt::format("    family {}, foresight {}, {}, guarantee {}, {}{}\n", info.family, word(info.foresight),
+      fmt::format("    family {}, foresight {}, {}, guarantee {}, {}{}\n", info.family, name(info.foresight),
                   info.tightness == Tightness::none ? "bounds of no declared tightness"
-                                                    : std::string(word(info.tightness)) + " bounds",
-                  word(info.guarantee), joined(scalars_of(info), " and "),
+                                                    : std::string(name(info.tightness)) + " bounds",
+                  name(info.guarantee), joined(scalars_of(info), " and "),
                   info.own_scalar.empty() ? "" : ", keeps bounds in " + info.own_scalar);
   if (!info.version.empty()) text += "    " + info.version + ", instructions " + info.instructions + "\n";
   if (!info.remark.empty()) text += wrapped(info.remark, "    ");
@@ -139,7 +118,7 @@ void print_strategy(const Info& info) {
     text += fmt::format("    at its best: {}, width {}, {} primitives per leaf\n",
                         name(info.topology.preferred.method), info.topology.preferred.width,
                         info.topology.preferred.leaf_size);
-  if (const auto words = capabilities_of(info); !words.empty()) text += "    can: " + joined(words) + "\n";
+  if (const auto words = names(info.can); !words.empty()) text += "    can: " + joined(words) + "\n";
   if (info.baseline) text += "    a baseline: ratios are against the one with the shortest clip\n";
   if (const auto words = primitives_of(info); words.size() < 3)
     text += "    takes only " + joined(words, " and ") + "\n";

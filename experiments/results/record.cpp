@@ -7,10 +7,6 @@ namespace kbvh::experiments {
 
 using nlohmann::json;
 
-const char* word(PrimitiveKind kind) {
-  return name(kind);
-}
-
 const char* word(SceneOrigin origin) {
   switch (origin) {
     case SceneOrigin::built_in:
@@ -43,7 +39,7 @@ json scene_record(const Scene<S>& scene, const LoadedScene& loaded, std::uint32_
                       {"vertices", loaded.meshes[i].vertex_count},
                       {"keyframes", body.plans.keyframe_count()},
                       {"moving", body.plans.moving()},
-                      {"kind", word(body.primitives.kind)},
+                      {"kind", name(body.primitives.kind)},
                       {"self", i < loaded.self.size() && loaded.self[i]},
                       {"degenerate", loaded.meshes[i].degenerate_primitives}});
     if (i < loaded.vertices_of.size() && loaded.vertices_of[i] != i)

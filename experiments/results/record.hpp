@@ -17,7 +17,6 @@ inline constexpr int results_schema = 2;
 inline constexpr int oldest_results_schema = 1;
 
 /// Returns the word used in result files.
-const char* word(PrimitiveKind kind);
 const char* word(SceneOrigin origin);
 
 /// Makes the "scene" of a record: the played scene, its times, and the script that is replayed until the last

@@ -6,52 +6,14 @@ namespace kbvh::experiments {
 
 using nlohmann::json;
 
-const char* word(Tightness tightness) {
-  switch (tightness) {
-    case Tightness::tight:
-      return "tight";
-    case Tightness::conservative:
-      return "conservative";
-    case Tightness::none:
-      break;
-  }
-  return "none";
-}
-
-const char* word(Guarantee guarantee) {
-  switch (guarantee) {
-    case Guarantee::exact:
-      return "exact";
-    case Guarantee::candidate_superset:
-      return "candidate_superset";
-    case Guarantee::approximate:
-      break;
-  }
-  return "approximate";
-}
-
-const char* word(Foresight foresight) {
-  switch (foresight) {
-    case Foresight::step_bound:
-      return "step_bound";
-    case Foresight::next_keyframe:
-      return "next_keyframe";
-    case Foresight::whole_clip:
-      return "whole_clip";
-    case Foresight::none:
-      break;
-  }
-  return "none";
-}
-
 json about_strategy(const Info& info) {
   return {{"id", info.id},
           {"title", info.title},
           {"family", info.family},
           {"baseline", info.baseline},
-          {"guarantee", word(info.guarantee)},
-          {"tightness", word(info.tightness)},
-          {"foresight", word(info.foresight)},
+          {"guarantee", name(info.guarantee)},
+          {"tightness", name(info.tightness)},
+          {"foresight", name(info.foresight)},
           {"citation", info.citation},
           {"about", about(info.id)},
           {"own_scalar", info.own_scalar},

@@ -5,11 +5,6 @@
 
 namespace kbvh::experiments {
 
-/// Returns the word used in result files.
-const char* word(Tightness tightness);
-const char* word(Guarantee guarantee);
-const char* word(Foresight foresight);
-
 /// Returns what records and `kbvh list` say of a strategy.
 nlohmann::json about_strategy(const Info& info);
 /// Returns the method, width and leaf size of a builder.

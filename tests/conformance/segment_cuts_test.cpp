@@ -61,9 +61,8 @@ double looseness(const std::string& scene, const std::map<std::string, std::stri
   const TestScene<double> test = synthetic_scene<double>(scene, 8);
   const StrategyEntry& entry = find_strategy("linear_bounds");
   Session<double> session(test.scene, {&entry, params, entry.info.topology.preferred});
-  Oracle<double> oracle(test.scene);
   const std::vector<double> frames = test.frames.empty() ? frame_times(test.scene, 8) : test.frames;
-  return verify(session, std::span<const double>(frames), oracle,
+  return verify(session, std::span<const double>(frames), shared_oracle(test),
                 test.script.steps.empty() ? nullptr : &test.script)
       .audit.looseness();
 }

@@ -1,16 +1,10 @@
-// The generic refit with every kind of volume over every synthetic scene, and on topologies that are rotated
-// at every frame.
+// The generic refit with every kind of volume over every synthetic scene.
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cstdlib>
 
-#include "core/families/volumes/volume_strategy.hpp"
-#include "core/geometry/volumes/dop.hpp"
-#include "core/geometry/volumes/obb.hpp"
-#include "core/geometry/volumes/sphere.hpp"
-#include "core/judge/audit.hpp"
 #include "tests/conformance/check.hpp"
 
 namespace kbvh::test::volumes_test {
@@ -91,84 +85,6 @@ TEST(EveryVolume, KDopsLeaveFewerCandidatesThanBoxes) {
   EXPECT_LT(dop14, box);
   EXPECT_LT(dop26, dop14);
   EXPECT_LT(candidates("obb"), box);
-}
-
-/// Rotates a few random nodes of every body at each frame, after the refit: the query reads rotated volumes.
-template <class S, class V>
-class Rotating : public VolumeStrategy<S, V> {
-  using Base = VolumeStrategy<S, V>;
-
- public:
-  Rotating(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies, const Params&)
-      : Base(scene, motion, std::move(topologies), 0) {}
-  void advance_to(double t) override {
-    Base::advance_to(t);
-    this->on_bodies([&](auto& bodies) {
-      for (auto& body : bodies)
-        for (int i = 0; i < 8; ++i) rotate_one(body);
-    });
-  }
-
- private:
-  void rotate_one(VolumeHierarchy<V>& body) {
-    const Topology& topology = body.topology();
-    if (topology.size() < 5) return;
-    const std::uint32_t node = 1 + random_.below(topology.size() - 1);
-    const TopologyNode siblings = topology.nodes[topology.parents[node]];
-    const std::uint32_t sibling = siblings.first() + (node == siblings.first() ? 1 : 0);
-    if (topology.nodes[sibling].is_leaf()) return;
-    body.rotate(node, topology.nodes[sibling].first() + random_.below(2));
-    ++rotations;
-  }
-  Random random_{97};
-
- public:
-  static inline std::uint64_t rotations = 0;
-};
-template <class S>
-using RotatingBoxes = Rotating<S, Box<S>>;
-template <class S>
-using RotatingDops = Rotating<S, Dop<S, 18>>;
-template <class S>
-using RotatingSpheres = Rotating<S, Sphere<S>>;
-template <class S>
-using RotatingObbs = Rotating<S, Obb<S>>;
-
-template <template <class> class T>
-StrategyEntry rotating(Tightness tightness) {
-  Info info;
-  info.id = "rotating";
-  info.tightness = tightness;
-  info.declares = {.restructures = true, .time_budget = true};
-  info.topology.widths = {2};
-  info.topology.preferred = {.method = BuildMethod::median, .width = 2, .leaf_size = 2};
-  return make_entry<T>(std::move(info));
-}
-
-class Rotations : public testing::TestWithParam<std::string> {};
-
-TEST_P(Rotations, AtEveryFrameKeepEveryGuarantee) {
-  RotatingBoxes<float>::rotations = 0;
-  // Around the boxes of control nets, and of primitives that meet them, k-DOPs differ from those of the
-  // vertices.
-  const bool nets = GetParam().find("points") != std::string::npos;
-  const Tightness dops = nets ? Tightness::conservative : Tightness::tight;
-  for (const std::uint32_t l : {1u, 7u}) {
-    EXPECT_EQ(violations(rotating<RotatingBoxes>(Tightness::tight), GetParam(), l, {}), "|");
-    EXPECT_EQ(violations(rotating<RotatingDops>(dops), GetParam(), l, {}), "|");
-    EXPECT_EQ(violations(rotating<RotatingSpheres>(Tightness::conservative), GetParam(), l, {}), "|");
-  }
-  EXPECT_EQ(violations(rotating<RotatingObbs>(Tightness::conservative), GetParam(), 3, {}), "|");
-  if (GetParam() == "soups" || GetParam() == "sheets") {
-    EXPECT_GT((RotatingBoxes<float>::rotations), 100u);
-  }
-}
-
-INSTANTIATE_TEST_SUITE_P(Synthetic, Rotations, testing::ValuesIn(all_synthetic_names()),
-                         [](const auto& test) { return test.param; });
-
-TEST(Rotations, AreTakenBackByReset) {
-  expect_reset_restores_topology(rotating<RotatingDops>(Tightness::tight));
 }
 
 }  // namespace

@@ -13,8 +13,8 @@ namespace {
 
 enum class Boxes : std::uint8_t { recomputed, as_before_the_edit };
 
-/// Edits every moving body at each frame, after the refit: rotates random nodes, rebuilds a subtree, and
-/// moves another one. The query reads the edited layout.
+/// Edits every moving body at each frame, after the refit: rotates random nodes and rebuilds a subtree. The
+/// query reads the edited layout.
 template <class S, Boxes boxes>
 class Restructuring : public StoredHierarchyStrategy<S>,
                       public AnswersSelfPairs,
@@ -36,22 +36,12 @@ class Restructuring : public StoredHierarchyStrategy<S>,
     const Topology& topology = hierarchy.topology();
     if (topology.size() < 5) return;
     for (int i = 0; i < 6; ++i) rotate(body);
-    const std::uint32_t node = any_node(topology), target = any_node(topology);
-    const auto with_editor = [&](const auto& change) {
-      edit(body, [&](Topology& edited, TopologyEdit& list) {
-        TopologyEditor editor(edited, this->scene_.primitives(body).count());
-        change(editor, edited, list);
-      });
-    };
-    if (!topology.nodes[node].is_leaf())
-      with_editor([&](TopologyEditor& editor, Topology& edited, TopologyEdit& list) {
-        editor.rebalance(edited, node, list, [&](std::uint32_t n) { return to_double(hierarchy.box(n)); });
-      });
-    else if (!is_above(topology, node, target) && topology.parents[target] != topology.parents[node] &&
-             topology.parents[node] != target)
-      with_editor([&](TopologyEditor& editor, Topology& edited, TopologyEdit& list) {
-        editor.move_beside(edited, node, target, list);
-      });
+    const std::uint32_t node = any_node(topology);
+    if (topology.nodes[node].is_leaf()) return;
+    edit(body, [&](Topology& edited, TopologyEdit& list) {
+      TopologyEditor editor(edited, this->scene_.primitives(body).count());
+      editor.rebalance(edited, node, list, [&](std::uint32_t n) { return to_double(hierarchy.box(n)); });
+    });
   }
   /// Exchanges a child of a random node with a child of one of its siblings.
   void rotate(std::uint32_t body) {
@@ -76,10 +66,6 @@ class Restructuring : public StoredHierarchyStrategy<S>,
       const std::uint32_t node = random_.below(topology.size());
       if (topology.parents[node] < topology.size()) return node;
     }
-  }
-  static bool is_above(const Topology& topology, std::uint32_t upper, std::uint32_t node) {
-    while (node != upper && node != 0) node = topology.parents[node];
-    return node == upper;
   }
 
   Random random_{97};

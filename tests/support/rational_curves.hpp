@@ -154,17 +154,28 @@ Rational rational_value(const CurvedPiece<S>& p, const Rational& t) {
   return value(rational_difference(p, CurvedPiece<S>{p.t0, p.t1, 0, 0, 0, 0}), s);
 }
 
-/// Returns the coordinates [vertex][3] of a body at t.
+/// Returns the coordinates [vertex][3] of a body at t. All vertices have the same shares of the definition's
+/// terms.
 template <class S>
 std::vector<Rational> rational_values(const FlightPlans<S>& plans, double t) {
   const auto times = plans.keyframe_times();
   const std::size_t k = plans.segment_at(t);
+  const bool between = t > times[k] && k + 1 < times.size();
+  Rational s = 0, of_bend, of_twist;
+  if (between) s = (Rational(t) - Rational(times[k])) / (Rational(times[k + 1]) - Rational(times[k]));
+  of_bend = s * (1 - s);
+  of_twist = s * of_bend;
   std::vector<Rational> values;
+  values.reserve(std::size_t(3) * plans.vertex_count());
   for (std::uint32_t v = 0; v < plans.vertex_count(); ++v)
-    for (int axis = 0; axis < 3; ++axis)
-      values.push_back(t <= times[k] || k + 1 == times.size()
-                           ? Rational(double(plans.keyframe(k)[3 * v + std::uint32_t(axis)]))
-                           : rational_value(plans.curved_piece(v, axis, k), Rational(t)));
+    for (int axis = 0; axis < 3; ++axis) {
+      Rational& x = values.emplace_back(double(plans.keyframe(k)[3 * v + std::uint32_t(axis)]));
+      if (!between) continue;
+      const CurvedPiece<S> piece = plans.curved_piece(v, axis, k);
+      if (piece.x1 != piece.x0) x += (Rational(double(piece.x1)) - x) * s;
+      if (piece.bend != 0) x += Rational(double(piece.bend)) * of_bend;
+      if (piece.twist != 0) x += Rational(double(piece.twist)) * of_twist;
+    }
   return values;
 }
 

@@ -13,9 +13,7 @@
 
 #include "broad_phase_oracle.hpp"
 #include "core/contract/registry.hpp"
-#include "core/families/volumes/volume_hierarchy.hpp"
 #include "core/families/wide/wide_hierarchy.hpp"
-#include "core/geometry/volumes/sphere.hpp"
 #include "core/topology/builders.hpp"
 #include "core/topology/subtree_swap.hpp"
 #include "tests/support/curved_scenes.hpp"
@@ -301,38 +299,6 @@ TEST(Allocation, NoneOnceWarmWithAnyVolume) {
       EXPECT_EQ(allocations_when_warm(entry, in_float, {{parameter.name, word}}), "") << word;
       EXPECT_EQ(allocations_when_warm(entry, in_double, {{parameter.name, word}}), "") << word;
     }
-}
-
-TEST(Allocation, NoneByRotationsOnceWarm) {
-  const auto test = synthetic_scene<float>("sheets", 7);
-  const Primitives& primitives = test.scene.bodies[0].primitives;
-  const float* const positions = test.scene.bodies[0].plans.keyframe(0);
-  std::vector<float> padded(positions,
-                            positions + std::size_t(3) * test.scene.bodies[0].plans.vertex_count());
-  padded.push_back(0);
-  VolumeHierarchy<Sphere<float>> hierarchy(
-      build_topology(primitives, padded.data(), {.method = BuildMethod::sah, .width = 2, .leaf_size = 1}),
-      primitives, Cover::vertices);
-  std::size_t rotations = 0;
-  std::uint64_t spent = 0, before = 0;
-  for (int round = 0; round < 2; ++round) {
-    before = allocations;
-    hierarchy.restore();
-    hierarchy.refit(padded.data());
-    Random random(3);
-    for (int i = 0; i < 2000; ++i) {
-      const Topology& topology = hierarchy.topology();
-      const std::uint32_t node = 1 + random.below(topology.size() - 1);
-      const TopologyNode siblings = topology.nodes[topology.parents[node]];
-      const std::uint32_t sibling = siblings.first() + (node == siblings.first() ? 1 : 0);
-      if (topology.nodes[sibling].is_leaf()) continue;
-      hierarchy.rotate(node, topology.nodes[sibling].first() + random.below(2));
-      ++rotations;
-    }
-    spent = allocations - before;
-  }
-  EXPECT_GT(rotations, 500u);
-  EXPECT_EQ(spent, 0u);
 }
 
 /// Returns the allocations of 2,000 random exchanges in a wide hierarchy, with new boxes, in the second of

@@ -60,20 +60,6 @@ class Edited {
     editor_->remove(topology_, p, edit_);
     refit();
   }
-  /// Moves a random subtree next to a random node; returns whether that is possible.
-  bool move_beside() {
-    const std::uint32_t node = any_node(), target = any_node();
-    try {
-      editor_->move_beside(topology_, node, target, edit_);
-    } catch (const std::invalid_argument&) {
-      return false;
-    }
-    refit();
-    return true;
-  }
-  void move_beside(std::uint32_t node, std::uint32_t target) {
-    editor_->move_beside(topology_, node, target, edit_);
-  }
   std::uint32_t any_primitive() { return living_[random_.below(std::uint32_t(living_.size()))]; }
   std::size_t living() const { return living_.size(); }
 
@@ -112,12 +98,6 @@ class Edited {
   }
 
  private:
-  std::uint32_t any_node() {
-    for (;;) {
-      const std::uint32_t node = random_.below(topology_.size());
-      if (topology_.parents[node] < topology_.size()) return node;
-    }
-  }
   std::uint32_t add(const Box<double>& box) {
     const std::uint32_t vertex[1] = {primitives_.count()};
     primitives_.add(vertex);
@@ -280,43 +260,6 @@ TEST(ListPool, KeepsListsApart) {
   pool.clear();
   EXPECT_EQ(pool.keys(), expected.size());
   for (std::uint32_t k = 0; k < pool.keys(); ++k) EXPECT_TRUE(pool[k].empty());
-}
-
-// Subtrees move anywhere, between insertions and removals; a refusal changes nothing.
-TEST(TopologyEditor, MovesSubtrees) {
-  for (const std::uint32_t width : {2u, 4u, 8u})
-    for (const std::uint32_t leaf_size : {1u, 3u}) {
-      Edited edited(60, {.method = BuildMethod::sah, .width = width, .leaf_size = leaf_size},
-                    width + leaf_size);
-      std::uint32_t moved = 0, refused = 0;
-      for (int i = 0; i < 600; ++i) {
-        const Topology before = edited.topology();
-        const bool possible = edited.move_beside();
-        ++(possible ? moved : refused);
-        ASSERT_EQ(edited.fault(), "") << "width " << width << ", step " << i;
-        if (!possible) {
-          ASSERT_TRUE(edited.topology() == before);
-        }
-        if (i % 5 == 0) edited.remove(edited.any_primitive());
-        if (i % 5 == 1) edited.insert(edited.random_box());
-        ASSERT_EQ(edited.fault(), "") << "width " << width << ", step " << i;
-      }
-      EXPECT_GT(moved, 200u);
-      EXPECT_GT(refused, 5u);
-    }
-}
-
-TEST(TopologyEditor, RefusesMovesThatLeadNowhere) {
-  Edited edited(40, {.method = BuildMethod::median, .width = 2, .leaf_size = 1}, 3);
-  const Topology before = edited.topology();
-  const std::uint32_t left = before.nodes[0].first(), below = before.nodes[left].first();
-  EXPECT_THROW(edited.move_beside(0, left), std::invalid_argument);
-  EXPECT_THROW(edited.move_beside(left, left), std::invalid_argument);
-  EXPECT_THROW(edited.move_beside(left, below), std::invalid_argument);
-  EXPECT_THROW(edited.move_beside(below, left), std::invalid_argument) << "its parent";
-  EXPECT_THROW(edited.move_beside(left, left + 1), std::invalid_argument) << "its sibling";
-  EXPECT_THROW(edited.move_beside(left, before.size()), std::invalid_argument);
-  EXPECT_TRUE(edited.topology() == before);
 }
 
 }  // namespace

@@ -10,10 +10,8 @@ namespace kbvh {
 /// The shared part of strategies that refit at every frame and restructure by exchanging the primitives of
 /// leaves. A derived class implements `update(body)`; the queries of a frame add to the age of both trees.
 template <class S>
-class LeafStrategy : public StoredHierarchyStrategy<S>,
-                     public AnswersSelfPairs,
-                     public TakesGeometryChanges<S> {
-  using Base = StoredHierarchyStrategy<S>;
+class LeafStrategy : public EditedHierarchyStrategy<S> {
+  using Base = EditedHierarchyStrategy<S>;
 
  public:
   LeafStrategy(const SceneView<S>& scene, const SampledMotion<S>& motion, Topologies topologies,
@@ -50,10 +48,6 @@ class LeafStrategy : public StoredHierarchyStrategy<S>,
     this->count_.add(Counter::box_tests, tests);
     this->last_box_tests_ = tests;
     return status;
-  }
-
-  void follow_geometry(double /*t*/, const GeometryChange<S>& change) override {
-    this->edit_geometry(change);
   }
 
   double growth() const override {

@@ -1,5 +1,6 @@
 #include "core/families/volumes/dop_hierarchy.hpp"
 
+#include <algorithm>
 #include <array>
 
 namespace kbvh {
@@ -42,35 +43,25 @@ template <class S, int K>
 void DopHierarchy<S, K>::assign(Topology topology, const Primitives& primitives) {
   topology_ = std::move(topology);
   primitives_ = &primitives;
-  LeafVertices lists;
-  if (cover_ == Cover::vertices) lists = unique_leaf_vertices(topology_, primitives);
-  points_ = std::move(lists.vertices);
+  LeafVertices lists = points_of_leaves(topology_, primitives, cover_);
   nodes_.clear();
   for (std::uint32_t node = 0; node < topology_.size(); ++node) {
     const TopologyNode content = topology_.nodes[node];
-    if (!content.is_leaf()) {
-      nodes_.push_back({content.first(), content.first() + content.count(), false});
-      continue;
-    }
-    if (cover_ == Cover::vertices) {
+    if (content.is_leaf())
       nodes_.push_back({lists.offsets[node], lists.offsets[node + 1], true});
-      continue;
-    }
-    const auto begin = std::uint32_t(points_.size());
-    for (std::uint32_t k = content.first(); k < content.first() + content.count(); ++k)
-      for (std::uint32_t corner = 0; corner < corners_each; ++corner)
-        points_.push_back(std::uint32_t(corners_each) * topology_.primitives[k] + corner);
-    nodes_.push_back({begin, std::uint32_t(points_.size()), true});
+    else
+      nodes_.push_back({content.first(), content.first() + content.count(), false});
   }
+  points_ = std::move(lists.vertices);
   point_count_ = 0;
   for (const std::uint32_t point : points_) point_count_ = std::max(point_count_, point + 1);
   sides_.assign(padded * topology_.size(), 0);
-  corners_.resize(cover_ == Cover::boxes ? 3 * corners_each * primitives.count() : 0);
+  corners_.resize(cover_ == Cover::boxes ? std::size_t(3) * corners_each * primitives.count() : 0);
 }
 
 template <class S, int K>
 void DopHierarchy<S, K>::refit(const S* positions) {
-  if (cover_ == Cover::boxes) place_corners(positions);
+  if (cover_ == Cover::boxes) place_corners(topology_, *primitives_, positions, corners_.data());
   constexpr const DopSlabs<S, K>& slabs = dop_slabs<S, K>;
   const S* const points = cover_ == Cover::boxes ? corners_.data() : positions;
   const S reach = kernels_->reach(points, std::size_t(3) * point_count_);
@@ -78,16 +69,6 @@ void DopHierarchy<S, K>::refit(const S* positions) {
   for (std::size_t slab = 0; slab < half; ++slab) margins[slab] = slabs.margins[slab] * reach;
   kernels_->refit(K)({nodes_.data(), std::uint32_t(nodes_.size()), points_.data(), points,
                       slabs.directions.data(), margins.data(), sides_.data()});
-}
-
-template <class S, int K>
-void DopHierarchy<S, K>::place_corners(const S* positions) {
-  for (const std::uint32_t primitive : topology_.primitives) {
-    const Box<S> box = primitive_box((*primitives_)[primitive], positions);
-    S* out = corners_.data() + 3 * corners_each * primitive;
-    for (std::size_t corner = 0; corner < corners_each; ++corner)
-      for (std::size_t d = 0; d < 3; ++d) *out++ = (corner >> d) & 1 ? box.upper[d] : box.lower[d];
-  }
 }
 
 template <class S, int K>

@@ -36,8 +36,6 @@ class DopHierarchy {
   /// Computes all volumes from positions [vertex][3], readable up to one scalar past the end. O(nodes + leaf
   /// points).
   void refit(const S* positions);
-  /// Does nothing: the topology stays as assigned.
-  void restore() {}
 
   const Topology& topology() const { return topology_; }
   bool empty() const { return topology_.empty(); }
@@ -84,9 +82,7 @@ class DopHierarchy {
   }
 
  private:
-  static constexpr std::size_t padded = padded_sides(K), half = padded / 2, corners_each = 8;
-
-  void place_corners(const S* positions);
+  static constexpr std::size_t padded = padded_sides(K), half = padded / 2;
 
   const DopKernels<S>* kernels_;
   Topology topology_;

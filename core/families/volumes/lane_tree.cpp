@@ -8,11 +8,6 @@
 #include <string>
 
 namespace kbvh {
-namespace {
-
-constexpr std::uint32_t corners_each = 8;
-
-}  // namespace
 
 template <class S>
 void LaneTree<S>::assign(Topology topology, const Primitives& primitives, Cover cover) {
@@ -21,26 +16,11 @@ void LaneTree<S>::assign(Topology topology, const Primitives& primitives, Cover 
   cover_ = cover;
   placed_.assign(cover == Cover::boxes ? 3 * corners_each * primitives.count() + 1 : 0, S(0));
   place_nodes();
-  const LeafVertices of_leaves = leaf_points();
+  const LeafVertices of_leaves = points_of_leaves(topology_, primitives, cover);
   listed_ = of_leaves.vertices.size();
   list_points(of_leaves);
   list_ranges(of_leaves);
   list_leaves();
-}
-
-template <class S>
-LeafVertices LaneTree<S>::leaf_points() const {
-  if (cover_ == Cover::vertices) return unique_leaf_vertices(topology_, *primitives_);
-  LeafVertices result;
-  result.offsets.push_back(0);
-  for (const TopologyNode& node : topology_.nodes) {
-    if (node.is_leaf())
-      for (std::uint32_t k = node.first(); k < node.first() + node.count(); ++k)
-        for (std::uint32_t corner = 0; corner < corners_each; ++corner)
-          result.vertices.push_back(corners_each * topology_.primitives[k] + corner);
-    result.offsets.push_back(std::uint32_t(result.vertices.size()));
-  }
-  return result;
 }
 
 template <class S>
@@ -50,12 +30,7 @@ const S* LaneTree<S>::place(const S* positions) {
     stamp_ = 1;
   }
   if (cover_ == Cover::vertices) return positions;
-  for (const std::uint32_t primitive : topology_.primitives) {
-    const Box<S> box = primitive_box((*primitives_)[primitive], positions);
-    S* out = placed_.data() + std::size_t(3) * corners_each * primitive;
-    for (std::size_t corner = 0; corner < corners_each; ++corner)
-      for (std::size_t d = 0; d < 3; ++d) *out++ = (corner >> d) & 1 ? box.upper[d] : box.lower[d];
-  }
+  place_corners(topology_, *primitives_, positions, placed_.data());
   return placed_.data();
 }
 

@@ -74,7 +74,6 @@ class LaneTree {
   void list_points(const LeafVertices& of_leaves);
   void list_ranges(const LeafVertices& of_leaves);
   void list_leaves();
-  LeafVertices leaf_points() const;
 
   Topology topology_;
   const Primitives* primitives_ = nullptr;

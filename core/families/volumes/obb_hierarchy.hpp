@@ -1,8 +1,7 @@
 #pragma once
 #include "core/families/volumes/kernels/obb.hpp"
-#include "core/families/volumes/lane_query.hpp"
+#include "core/families/volumes/lane_volumes.hpp"
 #include "core/geometry/volumes/obb.hpp"
-#include "core/kernels/kernel_set.hpp"
 
 namespace kbvh {
 
@@ -10,6 +9,22 @@ namespace kbvh {
 struct ObbFrameRule {
   bool follow = true;       ///< with three of the points below; otherwise they stay until chosen again
   std::uint32_t every = 0;  ///< refits until frames are chosen again; 0: never
+};
+
+/// The numbers of an oriented box in rows (kernels/obb.hpp).
+template <class S>
+struct ObbLayout {
+  using Volume = Obb<S>;
+  using Kernels = ObbKernels<S>;
+  static constexpr std::size_t rows = obb_rows, own = obb_own;
+  template <class Any, class Visitor>
+  static void visit(Any& box, const Visitor& visitor) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      visitor(i, box.centre[i]);
+      visitor(12 + i, box.half[i]);
+      for (std::size_t d = 0; d < 3; ++d) visitor(3 + 3 * i + d, box.axis[i][d]);
+    }
+  }
 };
 
 /// The oriented boxes of one body's hierarchy, refitted and compared eight at a time. Each box contains the
@@ -22,12 +37,10 @@ struct ObbFrameRule {
 /// extents. All admissible coordinates are sound; where squares of lengths would overflow or underflow, boxes
 /// are aligned with the coordinate axes.
 template <class S>
-class ObbHierarchy {
- public:
-  using Scalar = S;
-  using Volume = Obb<S>;
-  using Scratch = LaneScratch;
+class ObbHierarchy : public LaneVolumes<S, ObbLayout<S>> {
+  using Base = LaneVolumes<S, ObbLayout<S>>;
 
+ public:
   ObbHierarchy(Topology topology, const Primitives& primitives, Cover cover,
                KernelSet kernels = active_kernel_set());
 
@@ -44,35 +57,21 @@ class ObbHierarchy {
   /// Chooses new frames at the next refit.
   void restore() { due_ = 0; }
 
-  const Topology& topology() const { return tree_.topology(); }
-  bool empty() const { return tree_.empty(); }
-  Volume volume(std::uint32_t node) const;
-  std::vector<Volume> volumes() const;
-  void set_volume(std::uint32_t node, const Volume& volume);
-  std::size_t leaf_vertex_count() const { return tree_.leaf_point_count(); }
   std::size_t bytes() const;
-
-  /// Appends the pairs of primitives of two bodies, or of one, whose boxes and all oriented boxes above them
-  /// overlap. Counts the tests. Returns the number of pairs of nodes that the budget left undone.
-  static std::size_t find_pairs(ObbHierarchy& a, std::uint32_t body_a, ObbHierarchy& b, std::uint32_t body_b,
-                                Scratch& scratch, std::uint64_t& tests, const Budget& budget,
-                                PairBuffer& out);
 
  private:
   void choose_frames();
 
-  const ObbKernels<S>* kernels_;
-  KernelSet set_;
-  LaneTree<S> tree_;
-  Cover cover_;
+  using Base::coordinates_, Base::kernels_, Base::list_, Base::own_, Base::placed_, Base::rows_,
+      Base::scratch_, Base::tree_;
   ObbFrameRule rule_;
   std::uint32_t due_ = 0;  ///< refits until frames are chosen
-  const S* placed_ = nullptr;
   AlignedArray<std::uint32_t> leaf_frames_, node_frames_;
-  std::vector<std::uint32_t> list_;  ///< of the leaf whose frame is being chosen
-  AlignedArray<S> rows_, own_, node_axes_, coordinates_, scratch_;
+  AlignedArray<S> node_axes_;
 };
 
+extern template class LaneVolumes<float, ObbLayout<float>>;
+extern template class LaneVolumes<double, ObbLayout<double>>;
 extern template class ObbHierarchy<float>;
 extern template class ObbHierarchy<double>;
 

@@ -1,5 +1,6 @@
 #include "core/families/volumes/sphere_hierarchy.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace kbvh {
@@ -18,26 +19,21 @@ struct SquareRange {
 template <class S, SphereBounds bounds>
 SphereHierarchy<S, bounds>::SphereHierarchy(Topology topology, const Primitives& primitives, Cover cover,
                                             KernelSet kernels)
-    : kernels_(&sphere_kernels<S>(kernels)), set_(kernels), cover_(cover) {
+    : Base(sphere_kernels<S>(kernels), kernels, cover) {
   assign(std::move(topology), primitives);
 }
 
 template <class S, SphereBounds bounds>
 void SphereHierarchy<S, bounds>::assign(Topology topology, const Primitives& primitives) {
-  tree_.assign(std::move(topology), primitives, cover_);
-  const std::size_t nodes = tree_.node_count();
-  rows_.assign(32 * nodes, S(0));
-  own_.assign(4 * nodes, S(0));
-  boxes_.assign(8 * nodes, S(0));
-  scratch_.assign(std::size_t(24) * tree_.longest_list(), S(0));
+  this->assign_tree(std::move(topology), primitives);
+  boxes_.assign(std::size_t(8) * tree_.node_count(), S(0));
   coordinates_.assign(bounds == SphereBounds::wrapped ? 3 * tree_.points().size() : 0, S(0));
 }
 
 template <class S, SphereBounds bounds>
 void SphereHierarchy<S, bounds>::refit(const S* positions) {
   placed_ = tree_.place(positions);
-  if (empty()) return;
-  static_assert(sizeof(typename LaneTree<S>::Range) == 2 * sizeof(std::uint32_t));
+  if (this->empty()) return;
   const SphereRefit<S> job{
       tree_.nodes(),         tree_.node_count(),    tree_.lists(),         placed_,
       scratch_.data(),       rows_.data(),          own_.data(),           boxes_.data(),
@@ -78,61 +74,8 @@ void SphereHierarchy<S, bounds>::refit_without_kernels() {
   }
 }
 
-template <class S, SphereBounds bounds>
-Sphere<S> SphereHierarchy<S, bounds>::volume(std::uint32_t node) const {
-  Volume volume;
-  const bool root = node == 0 && tree_.wide_node(node) != tree_.none;
-  const LeafSlot slot = tree_.slot(node);
-  const S* const from = root ? own_.data() : rows_.data() + std::size_t(32) * slot.node() + slot.lane();
-  const std::size_t stride = root ? 1 : 8;
-  for (std::size_t d = 0; d < 3; ++d) volume.centre[d] = from[stride * d];
-  volume.radius = from[3 * stride];
-  return volume;
-}
-
-template <class S, SphereBounds bounds>
-void SphereHierarchy<S, bounds>::set_volume(std::uint32_t node, const Volume& volume) {
-  const S numbers[4] = {volume.centre[0], volume.centre[1], volume.centre[2], volume.radius};
-  const LeafSlot slot = tree_.slot(node);
-  const std::uint32_t wide = node == 0 ? 0 : tree_.wide_node(node);
-  for (std::size_t row = 0; row < 4; ++row) {
-    if (slot.word != tree_.none) rows_[std::size_t(32) * slot.node() + 8 * row + slot.lane()] = numbers[row];
-    if (wide != tree_.none) own_[std::size_t(4) * wide + row] = numbers[row];
-  }
-}
-
-template <class S, SphereBounds bounds>
-std::vector<Sphere<S>> SphereHierarchy<S, bounds>::volumes() const {
-  std::vector<Volume> all;
-  for (std::uint32_t node = 0; node < topology().size(); ++node) all.push_back(volume(node));
-  return all;
-}
-
-template <class S, SphereBounds bounds>
-std::size_t SphereHierarchy<S, bounds>::bytes() const {
-  return tree_.bytes() + list_.capacity() * sizeof(std::uint32_t) +
-         (rows_.capacity() + own_.capacity() + boxes_.capacity() + coordinates_.capacity() +
-          scratch_.capacity()) *
-             sizeof(S);
-}
-
-template <class S, SphereBounds bounds>
-std::size_t SphereHierarchy<S, bounds>::find_pairs(SphereHierarchy& a, std::uint32_t body_a,
-                                                   SphereHierarchy& b, std::uint32_t body_b, Scratch& scratch,
-                                                   std::uint64_t& tests, const Budget& budget,
-                                                   PairBuffer& out) {
-  if (a.empty() || b.empty()) return 0;
-  const bool overlap = a.kernels_->overlap(a.own_.data(), b.own_.data());
-  LaneSearch<S> search({&a.tree_, a.placed_, body_a}, {&b.tree_, b.placed_, body_b}, a.set_, scratch, budget,
-                       tests);
-  const SpherePair<S> pair{a.tree_.nodes(), b.tree_.nodes(), a.rows_.data(), b.rows_.data(), b.own_.data()};
-  const auto step = body_a == body_b ? a.kernels_->within : a.kernels_->traverse;
-  const std::size_t pending = search.run(
-      overlap, [&](WideTraversal& state) { step(pair, state); }, out);
-  tests = search.tests();
-  return pending;
-}
-
+template class LaneVolumes<float, SphereLayout<float>>;
+template class LaneVolumes<double, SphereLayout<double>>;
 template class SphereHierarchy<float, SphereBounds::wrapped>;
 template class SphereHierarchy<float, SphereBounds::layered>;
 template class SphereHierarchy<double, SphereBounds::wrapped>;

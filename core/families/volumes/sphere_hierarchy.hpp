@@ -1,8 +1,7 @@
 #pragma once
 #include "core/families/volumes/kernels/sphere.hpp"
-#include "core/families/volumes/lane_query.hpp"
+#include "core/families/volumes/lane_volumes.hpp"
 #include "core/geometry/volumes/sphere.hpp"
-#include "core/kernels/kernel_set.hpp"
 
 namespace kbvh {
 
@@ -10,6 +9,19 @@ namespace kbvh {
 enum class SphereBounds : std::uint8_t {
   wrapped,  ///< the points below the node
   layered,  ///< the spheres of its children
+};
+
+/// The numbers of a sphere in rows (kernels/sphere.hpp).
+template <class S>
+struct SphereLayout {
+  using Volume = Sphere<S>;
+  using Kernels = SphereKernels<S>;
+  static constexpr std::size_t rows = 4, own = 4;
+  template <class Any, class Visitor>
+  static void visit(Any& ball, const Visitor& visitor) {
+    for (std::size_t d = 0; d < 3; ++d) visitor(d, ball.centre[d]);
+    visitor(std::size_t(3), ball.radius);
+  }
 };
 
 /// The spheres of one body's hierarchy, refitted and compared eight at a time. Each has the centre of the box
@@ -23,12 +35,10 @@ enum class SphereBounds : std::uint8_t {
 /// 2^-70 (float) or 2^-500 (double) for underflow. Bodies with all coordinates below 2^-40 (2^-300), or with
 /// a coordinate above 2^60 (2^400), are fitted by `fit` and `enclose` of Sphere, layered, without SIMD.
 template <class S, SphereBounds bounds>
-class SphereHierarchy {
- public:
-  using Scalar = S;
-  using Volume = Sphere<S>;
-  using Scratch = LaneScratch;
+class SphereHierarchy : public LaneVolumes<S, SphereLayout<S>> {
+  using Base = LaneVolumes<S, SphereLayout<S>>;
 
+ public:
   SphereHierarchy(Topology topology, const Primitives& primitives, Cover cover,
                   KernelSet kernels = active_kernel_set());
 
@@ -37,35 +47,19 @@ class SphereHierarchy {
   void assign(Topology topology, const Primitives& primitives);
   /// Computes all spheres from positions [vertex][3], readable up to one scalar past the end.
   void refit(const S* positions);
-  /// Does nothing: the topology stays as assigned.
-  void restore() {}
 
-  const Topology& topology() const { return tree_.topology(); }
-  bool empty() const { return tree_.empty(); }
-  Volume volume(std::uint32_t node) const;
-  std::vector<Volume> volumes() const;
-  void set_volume(std::uint32_t node, const Volume& volume);
-  std::size_t leaf_vertex_count() const { return tree_.leaf_point_count(); }
-  std::size_t bytes() const;
-
-  /// Appends the pairs of primitives of two bodies, or of one, whose boxes and all spheres above them
-  /// overlap. Counts the tests. Returns the number of pairs of nodes that the budget left undone.
-  static std::size_t find_pairs(SphereHierarchy& a, std::uint32_t body_a, SphereHierarchy& b,
-                                std::uint32_t body_b, Scratch& scratch, std::uint64_t& tests,
-                                const Budget& budget, PairBuffer& out);
+  std::size_t bytes() const { return Base::bytes() + boxes_.capacity() * sizeof(S); }
 
  private:
   void refit_without_kernels();
 
-  const SphereKernels<S>* kernels_;
-  KernelSet set_;
-  LaneTree<S> tree_;
-  Cover cover_;
-  const S* placed_ = nullptr;
-  std::vector<std::uint32_t> list_;  ///< points of a leaf, if kernels are not used
-  AlignedArray<S> rows_, own_, boxes_, coordinates_, scratch_;
+  using Base::coordinates_, Base::kernels_, Base::list_, Base::own_, Base::placed_, Base::rows_,
+      Base::scratch_, Base::tree_;
+  AlignedArray<S> boxes_;
 };
 
+extern template class LaneVolumes<float, SphereLayout<float>>;
+extern template class LaneVolumes<double, SphereLayout<double>>;
 extern template class SphereHierarchy<float, SphereBounds::wrapped>;
 extern template class SphereHierarchy<float, SphereBounds::layered>;
 extern template class SphereHierarchy<double, SphereBounds::wrapped>;

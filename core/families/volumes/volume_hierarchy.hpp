@@ -1,8 +1,5 @@
 #pragma once
-#include <algorithm>
 #include <cstdint>
-#include <functional>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -10,7 +7,6 @@
 #include "core/families/wide/near_bodies.hpp"
 #include "core/geometry/lane_box.hpp"
 #include "core/geometry/volumes/bounding_volume.hpp"
-#include "core/topology/subtree_swap.hpp"
 #include "core/topology/topology.hpp"
 
 namespace kbvh {
@@ -21,8 +17,38 @@ enum class Cover : std::uint8_t {
   boxes,     ///< its axis-aligned box, for pairs of which only the boxes are compared
 };
 
+/// The corners of a primitive's box.
+inline constexpr std::uint32_t corners_each = 8;
+
+/// Lists the points that the volumes of leaves must contain: vertices, or corners of boxes, numbered as
+/// `place_corners` writes them.
+inline LeafVertices points_of_leaves(const Topology& topology, const Primitives& primitives, Cover cover) {
+  if (cover == Cover::vertices) return unique_leaf_vertices(topology, primitives);
+  LeafVertices result;
+  result.offsets.push_back(0);
+  for (const TopologyNode& node : topology.nodes) {
+    if (node.is_leaf())
+      for (std::uint32_t k = node.first(); k < node.first() + node.count(); ++k)
+        for (std::uint32_t corner = 0; corner < corners_each; ++corner)
+          result.vertices.push_back(corners_each * topology.primitives[k] + corner);
+    result.offsets.push_back(std::uint32_t(result.vertices.size()));
+  }
+  return result;
+}
+
+/// Writes the corners of the boxes of a topology's primitives: [primitive][8][3].
+template <class S>
+void place_corners(const Topology& topology, const Primitives& primitives, const S* positions, S* corners) {
+  for (const std::uint32_t primitive : topology.primitives) {
+    const Box<S> box = primitive_box(primitives[primitive], positions);
+    S* out = corners + std::size_t(3) * corners_each * primitive;
+    for (std::size_t corner = 0; corner < corners_each; ++corner)
+      for (std::size_t d = 0; d < 3; ++d) *out++ = (corner >> d) & 1 ? box.upper[d] : box.lower[d];
+  }
+}
+
 /// The hierarchy of one body that stores a bounding volume of any kind per node. The topology may have any
-/// width and may be rotated at run time.
+/// width.
 template <BoundingVolume V>
 class VolumeHierarchy {
  public:
@@ -42,14 +68,8 @@ class VolumeHierarchy {
   void assign(Topology topology, const Primitives& primitives) {
     topology_ = std::move(topology);
     primitives_ = &primitives;
-    start_.reset();
     volumes_.assign(topology_.size(), V{});
-    leaf_vertices_.assign(topology_.primitives.size(), {});
-    LeafVertices lists = unique_leaf_vertices(topology_, primitives);
-    for (std::uint32_t node = 0; node < topology_.size(); ++node)
-      if (topology_.nodes[node].is_leaf())
-        leaf_vertices_[topology_.nodes[node].first()] = {lists.offsets[node], lists.offsets[node + 1]};
-    vertices_ = std::move(lists.vertices);
+    leaf_vertices_ = unique_leaf_vertices(topology_, primitives);
     corners_.resize(cover_ == Cover::boxes ? std::size_t(topology_.leaf_size) * corners_each * 3 : 0);
   }
 
@@ -63,36 +83,13 @@ class VolumeHierarchy {
         enclose_children(node);
   }
 
-  /// Exchanges two subtrees (SubtreeSwap::swap) and recomputes the volumes of the two parents and of all
-  /// nodes above them; all volumes must be current. O(changed nodes + depth). The first call after `assign`
-  /// copies the topology.
-  void swap(std::uint32_t first, std::uint32_t second) {
-    keep_start();
-    swap_.swap(topology_, first, second, edit_);
-    follow_edit();
-  }
-  /// Does the same for a tree rotation (SubtreeSwap::rotate).
-  void rotate(std::uint32_t child, std::uint32_t grandchild) {
-    keep_start();
-    swap_.rotate(topology_, child, grandchild, edit_);
-    follow_edit();
-  }
-  /// Undoes all exchanges: restores the topology of the last `assign`. The volumes must be refitted
-  /// afterwards.
-  void restore() {
-    if (start_) topology_ = *start_;
-  }
-
   const Topology& topology() const { return topology_; }
   bool empty() const { return topology_.empty(); }
   const V& volume(std::uint32_t node) const { return volumes_[node]; }
   void set_volume(std::uint32_t node, const V& volume) { volumes_[node] = volume; }
   /// Returns the vertices of a leaf, each once, ascending.
-  std::span<const std::uint32_t> vertices(std::uint32_t leaf) const {
-    const Range range = leaf_vertices_[topology_.nodes[leaf].first()];
-    return {vertices_.data() + range.begin, vertices_.data() + range.end};
-  }
-  std::size_t leaf_vertex_count() const { return vertices_.size(); }
+  std::span<const std::uint32_t> vertices(std::uint32_t leaf) const { return leaf_vertices_[leaf]; }
+  std::size_t leaf_vertex_count() const { return leaf_vertices_.vertices.size(); }
   /// Returns a copy of all volumes, for audits.
   std::vector<V> volumes() const { return volumes_; }
 
@@ -111,10 +108,9 @@ class VolumeHierarchy {
   }
 
   std::size_t bytes() const {
-    return topology_.bytes() + (start_ ? start_->bytes() : 0) + volumes_.size() * sizeof(V) +
-           leaf_vertices_.size() * sizeof(Range) + vertices_.size() * sizeof(std::uint32_t) +
-           corners_.size() * sizeof(S) + swap_.bytes() + edit_.moved.capacity() * sizeof(TopologyEdit::Move) +
-           edit_.changed.capacity() * sizeof(std::uint32_t) + carried_.capacity() * sizeof(V);
+    return topology_.bytes() + volumes_.size() * sizeof(V) +
+           (leaf_vertices_.offsets.size() + leaf_vertices_.vertices.size()) * sizeof(std::uint32_t) +
+           corners_.size() * sizeof(S);
   }
 
  private:
@@ -123,10 +119,6 @@ class VolumeHierarchy {
     void ensure(std::uint32_t /*node*/) const {}
     const V& operator()(std::uint32_t node) const { return hierarchy.volume(node); }
     const VolumeHierarchy& hierarchy;
-  };
-  static constexpr std::size_t corners_each = 8;
-  struct Range {
-    std::uint32_t begin = 0, end = 0;
   };
 
   void fit_leaf(std::uint32_t leaf, const S* positions) {
@@ -147,34 +139,13 @@ class VolumeHierarchy {
     const TopologyNode content = topology_.nodes[node];
     enclose(volumes_[node], std::span<const V>(volumes_.data() + content.first(), content.count()));
   }
-  void keep_start() {
-    if (!start_) start_ = topology_;
-  }
-  void follow_edit() {
-    carried_.clear();
-    for (const auto& move : edit_.moved) carried_.push_back(volumes_[move.from]);
-    for (std::size_t i = 0; i < carried_.size(); ++i) volumes_[edit_.moved[i].to] = carried_[i];
-    // Walks up from the larger id first, because the larger may lie below the smaller.
-    std::sort(edit_.changed.begin(), edit_.changed.end(), std::greater<>());
-    for (std::uint32_t node : edit_.changed)
-      for (;; node = topology_.parents[node]) {
-        enclose_children(node);
-        if (node == 0) break;
-      }
-  }
 
   Topology topology_;
-  std::optional<Topology> start_;  ///< as assigned; kept from the first exchange on
   const Primitives* primitives_ = nullptr;
   Cover cover_;
   std::vector<V> volumes_;  ///< one per node
-  std::vector<Range>
-      leaf_vertices_;  ///< indexed by the leaf's first entry, because exchanges change the ids of leaves
-  std::vector<std::uint32_t> vertices_;
+  LeafVertices leaf_vertices_;
   std::vector<S> corners_;
-  SubtreeSwap swap_;
-  TopologyEdit edit_;
-  std::vector<V> carried_;
 };
 
 }  // namespace kbvh

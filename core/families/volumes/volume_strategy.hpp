@@ -42,14 +42,13 @@ class HierarchyStrategy : public CountedStrategy<S>,
     });
   }
 
-  /// Restarts with the initial topologies, or those of the last change of geometry: undoes all later
-  /// exchanges of subtrees.
+  /// Computes all volumes. Hierarchies that keep anything of earlier frames forget it (`restore`).
   void reset_to(double /*t*/) override {
     plans_changed_ = false;
     near_bodies_.start_over();
     on_bodies([&](auto& bodies) {
       for (std::uint32_t body = 0; body < bodies.size(); ++body) {
-        bodies[body].restore();
+        if constexpr (requires { bodies[body].restore(); }) bodies[body].restore();
         update(bodies[body], body);
       }
     });

@@ -200,6 +200,20 @@ class StoredHierarchyStrategy : public FixedPlansHierarchyStrategy<S>, public Ta
   }
 };
 
+/// Does the same where geometry changes, by `edit_geometry`, and also answers pairs within a body.
+template <class S>
+class EditedHierarchyStrategy : public StoredHierarchyStrategy<S>,
+                                public AnswersSelfPairs,
+                                public TakesGeometryChanges<S> {
+ public:
+  using StoredHierarchyStrategy<S>::StoredHierarchyStrategy;
+
+ protected:
+  void follow_geometry(double /*t*/, const GeometryChange<S>& change) override {
+    this->edit_geometry(change);
+  }
+};
+
 // Compiled once, in stored_hierarchy.cpp, instead of with every strategy.
 extern template class StoredHierarchyStrategy<float>;
 extern template class StoredHierarchyStrategy<double>;

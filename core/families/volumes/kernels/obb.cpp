@@ -308,7 +308,7 @@ template <class S, class V>
 template <class S, bool within>
 struct ObbView {
   static constexpr bool within_one = within, selects = false;
-  const ObbPair<S>& pair;
+  const LanePair<S>& pair;
 
   [[gnu::always_inline]] static bool waits(const WideTraversal&) { return false; }
   [[gnu::always_inline]] static void enter(std::uint32_t, std::uint32_t) {}
@@ -337,7 +337,7 @@ struct ObbView {
 };
 
 template <class S, bool within>
-void traverse(const ObbPair<S>& pair, WideTraversal& state) {
+void traverse(const LanePair<S>& pair, WideTraversal& state) {
   ObbView<S, within> view{pair};
   const WideArrays<S> a{pair.nodes_a, nullptr, nullptr, nullptr}, b{pair.nodes_b, nullptr, nullptr, nullptr};
   traverse_pairs<S>(a, b, view, state);

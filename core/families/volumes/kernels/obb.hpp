@@ -2,7 +2,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "core/families/wide/kernels/wide_overlap.hpp"
+#include "core/families/volumes/kernels/lane_pair.hpp"
 #include "core/kernels/kernel_tables.hpp"
 
 namespace kbvh {
@@ -34,19 +34,12 @@ struct ObbRefit {
   bool turn;                    ///< false: the axes in `rows` and `node_axes` stay as they are
 };
 
-/// Two trees' boxes, for a traversal.
-template <class S>
-struct ObbPair {
-  const WideNode *nodes_a, *nodes_b;
-  const S *rows_a, *rows_b, *own_b;
-};
-
 template <class S>
 struct ObbKernels {
   void (*refit)(const ObbRefit<S>& job);
   /// Continues a traversal (WideTraversal); `within`: of a tree with itself.
-  void (*traverse)(const ObbPair<S>& pair, WideTraversal& state);
-  void (*within)(const ObbPair<S>& pair, WideTraversal& state);
+  void (*traverse)(const LanePair<S>& pair, WideTraversal& state);
+  void (*within)(const LanePair<S>& pair, WideTraversal& state);
   /// Returns false only if two boxes (15 numbers each) have no common point.
   bool (*overlap)(const S* a, const S* b);
 };

@@ -197,7 +197,7 @@ template <class S>
 template <class S, bool within>
 struct SphereView {
   static constexpr bool within_one = within, selects = false;
-  const SpherePair<S>& pair;
+  const LanePair<S>& pair;
 
   [[gnu::always_inline]] static bool waits(const WideTraversal&) { return false; }
   [[gnu::always_inline]] static void enter(std::uint32_t, std::uint32_t) {}
@@ -227,7 +227,7 @@ struct SphereView {
 };
 
 template <class S, bool within>
-void traverse(const SpherePair<S>& pair, WideTraversal& state) {
+void traverse(const LanePair<S>& pair, WideTraversal& state) {
   SphereView<S, within> view{pair};
   const WideArrays<S> a{pair.nodes_a, nullptr, nullptr, nullptr}, b{pair.nodes_b, nullptr, nullptr, nullptr};
   traverse_pairs<S>(a, b, view, state);

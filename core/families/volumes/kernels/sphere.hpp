@@ -2,7 +2,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "core/families/wide/kernels/wide_overlap.hpp"
+#include "core/families/volumes/kernels/lane_pair.hpp"
 #include "core/kernels/kernel_tables.hpp"
 
 namespace kbvh {
@@ -27,13 +27,6 @@ struct SphereRefit {
   S* coordinates;               ///< [3][point_count]
 };
 
-/// Two trees' spheres, for a traversal.
-template <class S>
-struct SpherePair {
-  const WideNode *nodes_a, *nodes_b;
-  const S *rows_a, *rows_b, *own_b;
-};
-
 template <class S>
 struct SphereKernels {
   /// Centres are those of the boxes around the points below. Squares must not overflow.
@@ -43,8 +36,8 @@ struct SphereKernels {
   void (*wrapped)(const SphereRefit<S>& job);
   void (*layered)(const SphereRefit<S>& job);
   /// Continues a traversal (WideTraversal); `within`: of a tree with itself.
-  void (*traverse)(const SpherePair<S>& pair, WideTraversal& state);
-  void (*within)(const SpherePair<S>& pair, WideTraversal& state);
+  void (*traverse)(const LanePair<S>& pair, WideTraversal& state);
+  void (*within)(const LanePair<S>& pair, WideTraversal& state);
   /// Returns false only if two spheres (centre, radius) have no common point.
   bool (*overlap)(const S* a, const S* b);
 };
