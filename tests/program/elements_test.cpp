@@ -259,6 +259,31 @@ TEST_F(Binary, CandidatesOfElementsAreMeasuredAndKept) {
   EXPECT_EQ(records().size(), 2u) << "the same key";
 }
 
+TEST_F(Binary, OptionsSayPairsOfBodiesAndARadius) {
+  const std::string bodies =
+      "--body waving_sheet:triangles=98,keyframes=3,name=cloth "
+      "--body elements=vertices,of=cloth,name=corners --body elements=edges,of=cloth ";
+  const Outcome plan =
+      kbvh("run " + bodies +
+           "--name sheet --pairs corners:cloth,cloth-edges:cloth-edges --radius 0.1 --print-plan");
+  ASSERT_EQ(plan.code, 0) << plan.err;
+  const json scene = json::parse(plan.out).at("scenes").at(0), expected = sheet_with({{"radius", 0.1}});
+  EXPECT_EQ(scene.at("pairs"), expected.at("pairs"));
+  EXPECT_EQ(scene.at("radius"), 0.1);
+  EXPECT_EQ(hash(assemble<float>(load(spec_of(scene)))), hash(assemble<float>(load(spec_of(expected)))));
+  const Outcome none = kbvh("run --scene waving_sheet --radius 0 --print-plan");
+  EXPECT_EQ(json::parse(none.out).at("scenes").at(0).at("radius"), 0) << none.err;
+  EXPECT_FALSE(
+      json::parse(kbvh("run --scene waving_sheet --print-plan").out).at("scenes").at(0).contains("radius"));
+  for (const char* pairs : {"cloth", ":cloth", "cloth:", "a:b:c"})
+    EXPECT_TRUE(contains(
+        kbvh("run " + bodies + "--pairs " + pairs).err,
+        "--pairs: expected the names of two bodies, as in points:cloth, got '" + std::string(pairs) + "'"))
+        << pairs;
+  EXPECT_TRUE(contains(kbvh("run " + bodies + "--pairs cloth:ball").err, "there is no body 'ball'"));
+  EXPECT_TRUE(contains(kbvh("run --scene waving_sheet --radius 0.1 --continuous").err, "one has a radius"));
+}
+
 // ---- Wrong input
 
 std::string told(const std::string& scene) {
