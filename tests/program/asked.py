@@ -64,6 +64,7 @@ ASKED: dict[str, dict[str, Any]] = {
     "pairs with another parameter": {"strategies": [{"id": "bottom_up", "params": {"kernels": "portable"}}]},
     "pairs by another strategy": {"strategies": ["hybrid"]},
     "other vertex orders": {"scenes": [{**SCENES[0], "order": "shuffled", "seed": 5}, {**SCENES[1], "order": "renumbered"}]},
+    "other vertex orders of elements": {"scenes": [{**ELEMENTS[0], "order": "renumbered"}, {**ELEMENTS[1], "order": "shuffled"}]},
 }
 #: Command lines of scenes above, by the question and the place of the scene in it.
 SHEET = "--scene waving_sheet --triangles 200 --keyframes 3"
