@@ -218,7 +218,8 @@ class BroadPhase {
   void forget_trees();
 
   bool built() const { return elements_.has_value(); }
-  /// Returns the mesh. Throws std::logic_error before `build`, as do all functions but it.
+  /// Returns the mesh. Throws std::logic_error before `build`, as do all functions that ask about a mesh or
+  /// change it.
   const Elements& elements() const;
   S radius() const { return radius_; }
   const typename ElementTree<S>::Work& work(Element element) const {

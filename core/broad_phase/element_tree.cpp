@@ -174,7 +174,7 @@ void ElementTree<S>::refit_moved(const S* vertex_boxes, std::uint32_t vertices,
   remade_since_measured_ += work_.nodes_remade - before;
   if (remade_since_measured_ < tree_.node_count()) return;
   remade_since_measured_ = 0;
-  if (surface() > most_growth * surface_when_built_) forget();
+  if (surface() > most_growth * surface_when_built_) outdate();
 }
 
 template <class S>

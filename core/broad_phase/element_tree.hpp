@@ -36,7 +36,8 @@ class ElementTree {
   /// Updates a current tree whose boxes of `moved` vertices changed: leaves of their elements, and the nodes
   /// above as far as boxes change. O(elements at the vertices x height). The first call makes lists of the
   /// elements at each vertex, O(corners). Once as many nodes were computed again as there are, the surface is
-  /// compared as in `refresh`; if it has grown too much, the shape of the tree is forgotten.
+  /// compared as in `refresh`; where it has grown too much, the tree counts as outdated, and the next
+  /// `refresh` builds it again.
   void refit_moved(const S* vertex_boxes, std::uint32_t vertices, std::span<const std::uint32_t> moved,
                    double most_growth);
 
