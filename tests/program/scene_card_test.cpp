@@ -97,9 +97,9 @@ TEST(SceneCard, HashesSeeCurvesBetweenKeyframes) {
   twisted.bends[0].twist[4] += 0.5;
   std::swap(turned.bends[0], turned.bends[1]);
   std::vector<std::uint64_t> hashes;
-  for (const io::AnimatedMesh* mesh : {&flight, &lines, &bent, &twisted, &turned}) {
-    EXPECT_EQ(std::count(hashes.begin(), hashes.end(), hash_of_mesh(*mesh)), 0);
-    hashes.push_back(hash_of_mesh(*mesh));
+  for (const io::AnimatedMesh& mesh : std::vector<io::AnimatedMesh>{flight, lines, bent, twisted, turned}) {
+    EXPECT_EQ(std::count(hashes.begin(), hashes.end(), hash_of_mesh(mesh)), 0);
+    hashes.push_back(hash_of_mesh(mesh));
   }
 }
 
