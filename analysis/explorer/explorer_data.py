@@ -260,7 +260,7 @@ def _again(row: pd.Series) -> dict[str, Any]:
 
 #: Keys of a built-in scene in a plan, with their options.
 SCENE_OPTIONS = (("builtin", "--scene"), ("triangles", "--triangles"), ("obstacle", "--obstacle"), ("keyframes", "--keyframes"),
-                 ("seed", None), ("order", "--order"))  # fmt: skip
+                 ("radius", "--radius"), ("seed", None), ("order", "--order"))  # fmt: skip
 
 
 def _options(scene: dict[str, Any]) -> str:

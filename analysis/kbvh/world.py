@@ -107,8 +107,8 @@ class World:
 
     `radius` makes all pairs those of boxes grown by half of it, so that two primitives at a distance of at most `radius` are
     always a pair (`Scene` says more); by default it is the scene's. Only strategies that take control nets play such a world. It
-    finds no contacts, answers neither `hits` nor `within`, changes neither plans nor geometry, and copies all positions that are
-    set. Vertex v is two in `realisers` and in events: the corners 2 * v (lower) and 2 * v + 1 (upper) of its box.
+    finds no contacts, answers neither `hits` nor `within`, changes neither plans nor vertices (primitives come and go), and copies
+    all positions that are set. Vertex v is two in `realisers` and in events: the corners 2 * v (lower) and 2 * v + 1 (upper) of its box.
 
     Raises ValueError or TypeError for wrong input (ConfigError for a strategy or parameter), RuntimeError for calls in the wrong
     order and for abilities that the strategy lacks; nothing has changed then. Ctrl-C ends a long call at its next frame.

@@ -29,6 +29,10 @@ BroadPhase<S>::BroadPhase(const BroadPhaseSettings& settings)
     throw std::invalid_argument("leaf size must be 5 to 16, got " + std::to_string(settings.leaf_size));
   if (!(settings.most_growth >= 1))
     throw std::invalid_argument("growth must be at least 1, got " + number_text(settings.most_growth));
+  const std::vector<KernelSet>& sets = supported_kernel_sets();
+  if (std::find(sets.begin(), sets.end(), kernels_) == sets.end())
+    throw std::invalid_argument("kernels for '" + std::string(name(kernels_)) +
+                                "' cannot run on this machine");
 }
 
 template <class S>
@@ -164,7 +168,7 @@ void BroadPhase<S>::update(const MatrixView<S>& v, std::span<const std::uint32_t
   const bool few = moved.size() <= v.rows / 4;
   for (ElementTree<S>& tree : trees_) {
     if (few && tree.state() == ElementTree<S>::State::current)
-      tree.refit_moved(boxes_.data(), elements_->vertex_count(), moved);
+      tree.refit_moved(boxes_.data(), elements_->vertex_count(), moved, settings_.most_growth);
     else
       tree.outdate();
   }

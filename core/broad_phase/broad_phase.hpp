@@ -53,7 +53,8 @@ struct InsertedElements {
 template <class S>
 class BroadPhase {
  public:
-  /// Throws std::invalid_argument for a leaf size, a growth or a number of threads out of range.
+  /// Throws std::invalid_argument for a leaf size, a growth or a number of threads out of range, and for an
+  /// instruction set that this processor lacks.
   explicit BroadPhase(const BroadPhaseSettings& settings = {});
   ~BroadPhase();
   BroadPhase(const BroadPhase&) = delete;
@@ -86,9 +87,10 @@ class BroadPhase {
   /// Adds vertices at the positions `v` (k x 3; they rest in a motion) and edges and faces between vertices,
   /// the added ones included. From then on, positions have rows for the added vertices, too. Ids follow the
   /// largest of their kind, that of a removed element included; all other ids are unchanged. A tree whose
-  /// elements become more is built again by the next search. Added elements have the default groups, or the
-  /// union of their vertices' where these were set; a bound for each vertex is the smallest one for added
-  /// vertices. Throws as `build` does.
+  /// elements become more is built again by the next search. Added elements have the default groups; edges
+  /// and faces have the union of their vertices' present groups where `set_vertex_groups` was the last to set
+  /// those of their kind. A bound for each vertex is the smallest one for added vertices. Throws as `build`
+  /// does.
   template <IndexMatrix Edges, IndexMatrix Faces>
   InsertedElements insert(const MatrixView<S>& v, const Edges& e, const Faces& f) {
     const std::size_t vertices = elements().vertex_count() + v.rows;
@@ -157,8 +159,8 @@ class BroadPhase {
   void detect_face_vertex_candidates(CandidateBuffer& out) { detect(CandidateKind::face_vertex, out); }
   void detect_edge_face_candidates(CandidateBuffer& out) { detect(CandidateKind::edge_face, out); }
   void detect_face_face_candidates(CandidateBuffer& out) { detect(CandidateKind::face_face, out); }
-  /// Returns the same from memory of this object, without a copy; valid until the next build or update.
-  /// Searches only if the kept list is not valid any more.
+  /// Returns the same from memory of this object, without a copy; valid until the mesh, its positions, the
+  /// bound or a filter changes. Searches only if the kept list is not valid any more.
   std::span<const Candidate> candidates(CandidateKind kind);
 
   /// Finds the pairs of elements whose distance is at most `distance`, exactly: the answer is that of real
@@ -216,7 +218,8 @@ class BroadPhase {
   void forget_trees();
 
   bool built() const { return elements_.has_value(); }
-  /// Returns the mesh. Throws std::logic_error before `build`, as do all functions but it.
+  /// Returns the mesh. Throws std::logic_error before `build`, as do all functions that ask about a mesh or
+  /// change it.
   const Elements& elements() const;
   S radius() const { return radius_; }
   const typename ElementTree<S>::Work& work(Element element) const {

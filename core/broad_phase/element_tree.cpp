@@ -54,6 +54,7 @@ void ElementTree<S>::refresh(const S* vertex_boxes, double most_growth) {
     element_box_kernels<S>(kernels_).leaves(leaf_job(vertex_boxes));
     build_kernels<S>(kernels_).nodes(tree_.arrays(), tree_.leaf_boxes(), 0, tree_.node_count());
     ++work_.refits;
+    remade_since_measured_ = 0;
     if (!(surface() > most_growth * surface_when_built_)) {
       state_ = State::current;
       return;
@@ -75,6 +76,7 @@ void ElementTree<S>::build(const S* vertex_boxes) {
   list_corners();
   surface_when_built_ = surface();
   built_count_ = count;
+  remade_since_measured_ = 0;
   places_listed_ = groups_listed_ = contours_listed_ = false;
   state_ = State::current;
   ++work_.builds;
@@ -156,7 +158,7 @@ bool ElementTree<S>::remake_leaf(ElementLeafBoxesJob<S>& job, std::uint32_t leaf
 
 template <class S>
 void ElementTree<S>::refit_moved(const S* vertex_boxes, std::uint32_t vertices,
-                                 std::span<const std::uint32_t> moved) {
+                                 std::span<const std::uint32_t> moved, double most_growth) {
   KBVH_ASSERT(state_ == State::current);
   if (tree_.empty()) return;
   if (first_of_vertex_.empty()) list_incidence(vertices);
@@ -166,8 +168,13 @@ void ElementTree<S>::refit_moved(const S* vertex_boxes, std::uint32_t vertices,
       const std::uint32_t leaf = leaf_of_element_[elements_of_vertex_[i]];
       dirty_leaves_[leaf / 64] |= std::uint64_t(1) << leaf % 64;
     }
+  const std::uint64_t before = work_.nodes_remade;
   remake_marked(vertex_boxes);
   ++work_.partial_refits;
+  remade_since_measured_ += work_.nodes_remade - before;
+  if (remade_since_measured_ < tree_.node_count()) return;
+  remade_since_measured_ = 0;
+  if (surface() > most_growth * surface_when_built_) outdate();
 }
 
 template <class S>

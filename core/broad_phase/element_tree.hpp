@@ -35,8 +35,11 @@ class ElementTree {
   void forget() { state_ = State::unbuilt; }
   /// Updates a current tree whose boxes of `moved` vertices changed: leaves of their elements, and the nodes
   /// above as far as boxes change. O(elements at the vertices x height). The first call makes lists of the
-  /// elements at each vertex, O(corners).
-  void refit_moved(const S* vertex_boxes, std::uint32_t vertices, std::span<const std::uint32_t> moved);
+  /// elements at each vertex, O(corners). Once as many nodes were computed again as there are, the surface is
+  /// compared as in `refresh`; where it has grown too much, the tree counts as outdated, and the next
+  /// `refresh` builds it again.
+  void refit_moved(const S* vertex_boxes, std::uint32_t vertices, std::span<const std::uint32_t> moved,
+                   double most_growth);
 
   /// Takes further elements, whose list has grown: the next `refresh` builds another tree.
   void elements_inserted();
@@ -97,6 +100,7 @@ class ElementTree {
   UnfilledArray<std::uint32_t> leaf_ends_;     // [leaf]: as in the tree, less what was removed since
   std::uint32_t built_count_ = 0;              // elements when built
   double surface_when_built_ = 0;
+  std::uint64_t remade_since_measured_ = 0;  // nodes, by partial refits
   // For partial refits. Incidence is listed at the first one, places in the tree at the first one after a
   // build.
   std::vector<std::uint32_t> first_of_vertex_, elements_of_vertex_;

@@ -21,7 +21,7 @@ void check_count(const Elements& elements, Element element, std::size_t groups) 
 
 void PairFilter::clear() {
   for (auto& groups : groups_) groups.clear();
-  from_vertices_ = false;
+  from_vertices_.fill(false);
   for (Excluded& excluded : excluded_) excluded.pairs.clear();
   exclude_rings(0);
   function_ = nullptr;
@@ -30,14 +30,15 @@ void PairFilter::clear() {
 void PairFilter::set_groups(const Elements& elements, Element element, std::span<const GroupMask> groups) {
   if (!groups.empty()) check_count(elements, element, groups.size());
   groups_[std::size_t(element)].assign(groups.begin(), groups.end());
-  from_vertices_ = false;
+  from_vertices_[std::size_t(element)] = false;
 }
 
 void PairFilter::set_vertex_groups(const Elements& elements, std::span<const GroupMask> groups) {
   set_groups(elements, Element::vertex, groups);
-  groups_[std::size_t(Element::edge)].clear();
-  groups_[std::size_t(Element::face)].clear();
-  from_vertices_ = !groups.empty();
+  for (const Element element : {Element::edge, Element::face}) {
+    groups_[std::size_t(element)].clear();
+    from_vertices_[std::size_t(element)] = !groups.empty();
+  }
   elements_inserted(elements);
 }
 
@@ -47,14 +48,14 @@ void PairFilter::elements_inserted(const Elements& elements) {
   for (const Element element : {Element::edge, Element::face}) {
     std::vector<GroupMask>& list = groups_[std::size_t(element)];
     const std::uint32_t count = elements.count(element);
-    if (!from_vertices_) {
+    if (!from_vertices_[std::size_t(element)]) {
       if (!list.empty()) list.resize(count);
       continue;
     }
     while (list.size() < count) {
       GroupMask all{0, 0};
       for (const std::uint32_t v : elements.vertices(element, std::uint32_t(list.size())))
-        all |= of_vertices[v];
+        all |= of_vertices.empty() ? GroupMask{} : of_vertices[v];
       list.push_back(all);
     }
   }

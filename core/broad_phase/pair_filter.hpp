@@ -66,7 +66,8 @@ class PairFilter {
   /// VertexRings::build does.
   void prepare(const Elements& elements);
 
-  /// Takes further elements: with the default groups, or the union of their vertices'.
+  /// Takes further elements: with the default groups, or the union of their vertices' present ones if the
+  /// groups of their kind were set by `set_vertex_groups`.
   void elements_inserted(const Elements& elements);
 
   /// Returns whether there is a function of the caller, which only the caller's thread may call. All other
@@ -91,7 +92,8 @@ class PairFilter {
     std::vector<Candidate> pairs;           ///< ascending
   };
   std::array<std::vector<GroupMask>, element_kinds> groups_;
-  bool from_vertices_ = false;  ///< edges and faces have the groups of their vertices
+  /// [Element]: inserted edges, or faces, get the groups of their vertices, by `set_vertex_groups`
+  std::array<bool, element_kinds> from_vertices_{};
   std::array<Excluded, 6> excluded_;
   std::uint32_t rings_ = 0;
   bool rings_listed_ = false;

@@ -136,6 +136,9 @@ void StrategyBroadPhase<S>::detect(CandidateKind kind, CandidateBuffer& out) {
     search->session.hand_in(0, corners_.data());
     search->session.advance(time_, search->ignored);
   }
+  // `query` confirms each candidate by a comparison of its two boxes, without filters and motions, too: a
+  // strategy promises that its candidates contain the pairs, not that they are the pairs. Lazy strategies,
+  // inflated or drifting boxes and volumes other than boxes list more, and no property says which do not.
   search->session.query(search->pairs, search->ignored);
   out.resize(search->pairs.size());
   std::transform(search->pairs.begin(), search->pairs.end(), out.begin(), [](const PrimitivePair& pair) {

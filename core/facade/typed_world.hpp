@@ -107,6 +107,24 @@ struct TypedWorld {
     return playback.positions(body);
   }
 
+  /// Returns the vertices of a new primitive of a body as the played scene numbers them: with a radius, both
+  /// corners of each vertex's box. Throws std::invalid_argument.
+  std::vector<std::uint32_t> as_played(std::uint32_t body, const std::vector<std::uint32_t>& vertices) const {
+    if (!radius) return vertices;
+    check_body(body);
+    const std::uint32_t count = scene.bodies[body].plans.vertex_count();
+    std::vector<std::uint32_t> corners;
+    for (const std::uint32_t vertex : vertices) {
+      if (vertex >= count)
+        throw std::invalid_argument("geometry change: a new primitive of body " + std::to_string(body) +
+                                    " refers to vertex " + std::to_string(vertex) + ", but there are " +
+                                    std::to_string(count));
+      corners.push_back(2 * vertex);
+      corners.push_back(2 * vertex + 1);
+    }
+    return corners;
+  }
+
   /// Returns the plans of a body's vertices, with changes.
   const FlightPlans<S>& vertex_plans(std::uint32_t body) const {
     const Playback<S>& playback = session().playback();

@@ -141,7 +141,8 @@ void World::change_plans(const std::vector<WorldPlan>& plans) {
 void World::change_geometry(const WorldEdit& edit) {
   in_scalar([&]<class S>(TypedWorld<S>& world) {
     world.session();
-    world.check_no_radius("takes no changes of geometry");
+    if (!edit.vertices.empty() || !edit.removed_vertices.empty())
+      world.check_no_radius("takes no changes of vertices");
     GeometryChange<S> change;
     for (const WorldEdit::Vertex& vertex : edit.vertices) {
       world.check_body(vertex.body);
@@ -156,7 +157,7 @@ void World::change_geometry(const WorldEdit& edit) {
       }
     }
     for (const WorldEdit::Primitive& primitive : edit.primitives)
-      change.primitives.push_back({primitive.body, primitive.vertices});
+      change.primitives.push_back({primitive.body, world.as_played(primitive.body, primitive.vertices)});
     for (const WorldEdit::Id& id : edit.removed_primitives)
       change.removed_primitives.push_back({id.body, id.id});
     for (const WorldEdit::Id& id : edit.removed_vertices) change.removed_vertices.push_back({id.body, id.id});

@@ -288,9 +288,9 @@ class World {
   /// Makes all pairs those of boxes, grown by radius / 2 on each side and rounded outward: two primitives at
   /// a distance of at most `radius` are always a pair, others whose grown boxes overlap are pairs, too. Only
   /// strategies that take control nets play such a world, which finds no contacts, answers neither rays nor
-  /// balls, and changes neither plans nor geometry. Each vertex v is two in `realisers` and in events: the
-  /// corners 2 v (lower) and 2 v + 1 (upper) of its box; positions are those of the vertices. Throws
-  /// std::invalid_argument for a radius that is negative or no admissible length.
+  /// balls, and changes neither plans nor vertices; primitives come and go. Each vertex v is two in
+  /// `realisers` and in events: the corners 2 v (lower) and 2 v + 1 (upper) of its box; positions are those
+  /// of the vertices. Throws std::invalid_argument for a radius that is negative or no admissible length.
   void set_radius(double radius);
   /// Requests pairs of these two bodies, or within one body if both are the same. Without any such call, the
   /// pairs of all bodies are requested, and no pairs within a body.

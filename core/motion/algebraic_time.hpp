@@ -100,7 +100,6 @@ class BasicSturmSequence {
   int variations(const DyadicTime& t) const;
   std::vector<P> sequence_;
 };
-using SturmSequence = BasicSturmSequence<Polynomial>;
 
 /// An algebraic number: a dyadic number, or the only root of a polynomial strictly between two dyadic numbers
 /// with one exponent, which are no roots.
@@ -123,9 +122,8 @@ class BasicAlgebraicTime {
   /// outwards.
   double begin() const { return rounded(begin_, 0); }
   double end() const { return rounded(end_, dyadic_ && begin_.exponent <= 50 ? 0 : 1); }
-  /// Returns whether the number is known to be dyadic, and then equal to `exact_begin`.
-  bool is_dyadic() const { return dyadic_; }
-  /// Return the interval, which contains the number in its interior unless it is dyadic.
+  /// Return the interval, which contains the number in its interior; of one that is known to be dyadic, both
+  /// ends are the number.
   const DyadicTime& exact_begin() const { return begin_; }
   const DyadicTime& exact_end() const { return end_; }
 

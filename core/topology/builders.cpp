@@ -142,8 +142,8 @@ class BinaryBuilder {
     Box<S> whole;
     for (std::uint32_t i = begin; i < end; ++i) whole.extend(boxes_[items_[i].primitive]);
     const double area = surface_area(whole);
-    if (count <= config_.leaf_size && area * count <= best_cost + config_.sah_traversal_cost * area)
-      return begin;
+    // Visiting a node costs as much as one test of a primitive.
+    if (count <= config_.leaf_size && area * count <= best_cost + area) return begin;
     // A stable partition keeps the result independent of the library's order of swaps.
     const auto middle =
         std::stable_partition(items_.begin() + begin, items_.begin() + end,

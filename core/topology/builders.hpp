@@ -10,7 +10,7 @@ namespace kbvh {
 enum class BuildMethod : std::uint8_t {
   median,  ///< exact median along the longest axis of the centroids; full leaves and nodes, one depth,
            ///< perfect when sizes allow
-  sah,     ///< binned surface-area heuristic (Wald 2007), cost = traversal + area ratio x primitives
+  sah,     ///< binned surface-area heuristic (Wald 2007), cost = 1 + area ratio x primitives
   morton,  ///< linear BVH over 63-bit Morton codes of the centroids (Lauterbach et al. 2009)
 };
 const char* name(BuildMethod method);
@@ -19,10 +19,9 @@ BuildMethod build_method(std::string_view name);
 
 struct BuilderConfig {
   BuildMethod method = BuildMethod::median;
-  std::uint32_t width = 2;          ///< 2, 4 or 8
-  std::uint32_t leaf_size = 4;      ///< most primitives per leaf, 1..16
-  std::uint32_t sah_bins = 16;      ///< candidate planes + 1 per axis
-  double sah_traversal_cost = 1.0;  ///< of one node, in units of one primitive test
+  std::uint32_t width = 2;      ///< 2, 4 or 8
+  std::uint32_t leaf_size = 4;  ///< most primitives per leaf, 1..16
+  std::uint32_t sah_bins = 16;  ///< candidate planes + 1 per axis
 };
 
 /// Throws std::invalid_argument on an inadmissible width, leaf size, or number of bins.

@@ -14,10 +14,10 @@ struct RenumberedScene {
 };
 
 /// Renumbers every body along the leaves of the topology that `config` builds at the first frame. Geometry
-/// and motion stay the same; corners of a primitive keep their order. O(n log n), and a copy of all
-/// keyframes. Plan changes at run time are not carried over: renumber before a session starts.
-/// Throws std::invalid_argument for a body that names a vertex set: the leaves of another body have another
-/// order.
+/// and motion stay the same; corners of a primitive keep their order. The vertices of a vertex set are
+/// stored in the order of the leaves of its first body, then of the next one for vertices that are not
+/// in it; primitives of each body in that of its own leaves. O(n log n), and a copy of all keyframes. Plan
+/// changes at run time are not carried over: renumber before a session starts.
 template <class S>
 RenumberedScene<S> renumber_in_leaf_order(const Scene<S>& scene, const BuilderConfig& config);
 

@@ -35,10 +35,10 @@ int run_and_wait(std::vector<std::string> words);
 /// into the equivalent plan.
 struct StudyOptions {
   std::string plan_file, out, scene, name, clip, script, changes, rays, within, kernels, job, prepare;
-  std::vector<std::string> bodies, strategies, scalars, params, studies, orders, builders;
+  std::vector<std::string> bodies, pairs, strategies, scalars, params, studies, orders, builders;
   std::vector<std::uint64_t> triangles, seeds, l, widths, leaf_sizes;
   std::uint64_t obstacle = 0, keyframes = 0, repetitions = 0, frames_limit = 0, oracle_every = 0;
-  double interval_width = -1, seconds = -1;  ///< negative: not given
+  double radius = -1, interval_width = -1, seconds = -1;  ///< negative: not given
   bool print_plan = false, list_jobs = false, self = false, continuous = false, names = false;
 };
 

@@ -27,10 +27,16 @@ separated by commas: motion clip fps weld=false (files), name scale rotate=axis:
 curves=smooth|lines (all; cubics or lines through the keyframes); `kbvh list` shows the shapes. elements=edges,of=NAME is a body
 of the vertices, edges or faces of another one, over the same vertices. Polygons of more than three corners are cut into triangles once, at the first keyframe,
 whatever their first corner; from then on a polygon is the union of these triangles.
+Vertex-face and edge-edge candidates of a cloth within a centimetre, as a simulator asks for them:
+  kbvh run --body cloth.obj,motion=cloth.pc2,name=cloth --body elements=vertices,of=cloth,name=points \
+    --body elements=edges,of=cloth,name=edges --pairs points:cloth,edges:edges --radius 0.01
 A clip is timed from its first frame on: positions, the strategy's reset and its first answer count. Every contestant
 is verified, replayed, and then played in rounds, each in an order of its own, until the intervals of all ratios are
 narrow enough or the time is used up. The fastest stand first; --names shows all. RESULTS.md explains the table.
 Exit codes: 0 all guarantees hold, 1 one is broken, 2 wrong use or input, 3 other error.)";
+
+/// The largest radius on a command line; a plan may hold any that the scene's numbers admit.
+constexpr double largest_radius = 1e9;
 
 /// Converts parameters to the form of a plan: "key=a,b" becomes {"key": ["a", "b"]}.
 json params_of(const std::vector<std::string>& assignments) {
@@ -44,6 +50,19 @@ json params_of(const std::vector<std::string>& assignments) {
     params[assignment->first] = split(assignment->second, ',');
   }
   return params;
+}
+
+/// Converts "points:cloth" to the form of a plan: ["points", "cloth"].
+json body_pairs_of(const std::vector<std::string>& pairs) {
+  json list = json::array();
+  for (const std::string& text : pairs) {
+    const std::vector<std::string> names = split(text, ':');
+    if (names.size() != 2 || names[0].empty() || names[1].empty())
+      throw io::InputError("--pairs: expected the names of two bodies, as in points:cloth, got " +
+                           io::printable(text));
+    list.push_back(json::array({names[0], names[1]}));
+  }
+  return list;
 }
 
 /// Applies --clip to every glTF body without a clip of its own.
@@ -76,6 +95,8 @@ json scene_of(const StudyOptions& options) {
   if (!options.name.empty()) scene["name"] = options.name;
   if (!options.script.empty()) scene["script"] = options.script;
   if (options.self) scene["self"] = true;
+  if (!options.pairs.empty()) scene["pairs"] = body_pairs_of(options.pairs);
+  if (options.radius >= 0) scene["radius"] = options.radius;
   if (!options.orders.empty()) scene["order"] = options.orders;
   return scene;
 }
@@ -196,6 +217,14 @@ void add_study(CLI::App& command, const std::shared_ptr<StudyOptions>& o) {
           "--self", o->self,
           "also find pairs within every body, of primitives that share no vertex (vertices with the same "
           "positions at every keyframe are one: weld=false keeps them apart); of one body: self=true"),
+      add_words(
+          command, "--pairs", o->pairs,
+          "only the pairs of these bodies, by their names: NAME:NAME, with commas between pairs; one name "
+          "twice: pairs within it (all pairs with a moving body)"),
+      add_number(
+          command, "--radius", o->radius, 0, largest_radius,
+          "find pairs of boxes that are grown by half of this on each side, as a broad phase does, in the "
+          "scene's unit of length; 0: overlaps of boxes (none: exact intersections)"),
       add_words(command, "--order", o->orders, "vertex order: given, shuffled, renumbered; a list sweeps"),
       add_words(command, "--strategies", o->strategies,
                 "ids, family:NAME, default (all with a guarantee) or all; !x: without x"),

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 
@@ -83,6 +84,11 @@ void write(const LoadedScene& scene, const SceneOptions& options) {
     io::write_file_atomically(out, lab_scene(scene, lab_frames_per_keyframe).dump() + "\n");
   else
     export_scene(scene, out, 0);
+  if (!ends_in(options, ".obj") &&
+      std::any_of(scene.meshes.begin(), scene.meshes.end(),
+                  [](const io::AnimatedMesh& mesh) { return !mesh.bends.empty(); }))
+    say("note: vertices move on curves between keyframes, which " + io::printable(options.out) +
+        " does not hold");
 }
 
 void print_cards(const std::vector<BodyCard>& list) {

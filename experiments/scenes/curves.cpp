@@ -55,6 +55,7 @@ void append_flights(const std::vector<Flight>& flights, std::uint32_t keyframes,
 void smooth(io::AnimatedMesh& mesh) {
   const std::vector<double>& times = mesh.keyframe_times;
   const std::size_t scalars = std::size_t(3) * mesh.vertex_count;
+  mesh.bends.clear();
   if (times.size() < 3) return;
   const auto position = [&](std::size_t k, std::size_t i) { return mesh.positions[k * scalars + i]; };
   // The slope at a keyframe of the parabola through it and both neighbours.

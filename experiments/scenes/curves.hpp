@@ -9,7 +9,8 @@ namespace kbvh::scenes {
 
 /// Lets the vertices of a mesh move on cubics through its keyframes, without a jump of velocity: Hermite
 /// keyframes whose velocities come from the parabola through three neighbouring keyframes (at the ends, from
-/// the chord). Positions at keyframes stay. Does nothing to a mesh with fewer than three keyframes.
+/// the chord). Positions at keyframes stay. Curves that the mesh had are replaced; with fewer than three
+/// keyframes, by the chord.
 void smooth(io::AnimatedMesh& mesh);
 
 struct ThrownConfig {

@@ -148,6 +148,7 @@ io::AnimatedMesh thinned(const io::AnimatedMesh& mesh, std::size_t most_keyframe
   io::AnimatedMesh few = mesh;
   few.keyframe_times.clear();
   few.positions.clear();
+  few.bends.clear();  // files hold keyframes alone
   const std::size_t kept = std::min(most_keyframes, all), size = std::size_t(3) * mesh.vertex_count;
   for (std::size_t i = 0; i < kept; ++i) {
     const std::size_t k = kept == 1 ? 0 : i * (all - 1) / (kept - 1);
@@ -170,6 +171,10 @@ std::uint64_t card_hash(const LoadedScene& scene) {
     hasher.list(mesh.primitive_vertices);
     hasher.list(mesh.keyframe_times);
     hasher.list(mesh.positions);
+    for (const io::AnimatedMesh::Bends& segment : mesh.bends) {
+      hasher.list(segment.bend);
+      hasher.list(segment.twist);
+    }
   }
   if (!scene.vertices_of.empty()) hasher.list(scene.vertices_of);
   if (scene.radius) hasher.bytes(&*scene.radius, sizeof(double));

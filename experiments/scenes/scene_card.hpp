@@ -34,8 +34,8 @@ nlohmann::json as_json(const BodyCard& card);
 /// Returns {"scene": name, "bodies": [cards]}.
 nlohmann::json as_json(const std::string& scene, const std::vector<BodyCard>& list);
 
-/// Computes a hash of everything that a card and a picture show, the same in every scalar: it distinguishes
-/// scenes of the same name. O(size of the scene).
+/// Computes a hash of everything that a card and a picture show, and of the curves between keyframes, the
+/// same in every scalar: it distinguishes scenes of the same name. O(size of the scene).
 std::uint64_t card_hash(const LoadedScene& scene);
 
 /// Returns the name of a scene's folder: its name, shortened, and its card's hash.
@@ -43,7 +43,8 @@ std::string folder_name(const LoadedScene& scene);
 
 /// Writes a scene for inspection and pictures: every body as OBJ, with PC2 if it moves, its number before its
 /// name, and the cards as card.json, with the hash. `most_keyframes` limits the keyframes of long clips to
-/// this many: the first, the last and some between; 0: all. Throws io::InputError.
+/// this many: the first, the last and some between; 0: all. Curves between keyframes are not written. Throws
+/// io::InputError.
 void export_scene(const LoadedScene& scene, const std::filesystem::path& folder, std::size_t most_keyframes);
 
 }  // namespace kbvh::experiments

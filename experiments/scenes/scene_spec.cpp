@@ -348,8 +348,6 @@ std::vector<SceneSpec> read_scenes(const json& scene, const std::string& place, 
         spec.order = order_of(order, keys);
         if (spec.script && spec.order != VertexOrder::given)
           keys.fail("order", "a script names vertices in the given order");
-        if (spec.order == VertexOrder::renumbered && has_elements(spec))
-          keys.fail("order", "bodies of elements share their vertices, which are not renumbered");
         spec.said = text_of(json{object, count, seed, order}) + " in " + folder.string();
         spec.object = located_object;
         if (!spec.builtin.empty()) spec.object["triangles"] = count;

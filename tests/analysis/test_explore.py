@@ -128,13 +128,16 @@ class TestData(Folder):
         old["scene"]["origin"] = "built_in"
         unknown = line("bottom_up", [1.0], "file")
         unknown["scene"]["origin"] = "files"
-        data = self.data([built_in, shapes, old, unknown])
+        grown = line("bottom_up", [1.0], "z")
+        grown["again"] = {"scenes": [{"builtin": "waving_sheet", "triangles": 200, "radius": 0.05, "seed": 1, "order": "given"}]}
+        data = self.data([built_in, shapes, old, unknown, grown])
         again = [cell["again"] for cell in data["cells"]]
         self.assertEqual(again[0], {"options": "--scene tablecloth --triangles 512 --order shuffled --seed 3"})
         self.assertEqual(again[1], {"scene": {"bodies": [{"shape": "sphere"}]}})
         self.assertEqual(again[2], {"options": "--scene waving_sheet --triangles 1600 --obstacle 400"})
         self.assertIn("why", again[3])
-        self.assertEqual(data["runs"]["limit"], [7, 0, 0, 0])
+        self.assertEqual(again[4], {"options": "--scene waving_sheet --triangles 200 --radius 0.05"})
+        self.assertEqual(data["runs"]["limit"], [7, 0, 0, 0, 0])
 
     def test_cells_of_the_project_have_sizes_and_what_the_rule_needs(self) -> None:
         file = explorer_data.summary.REFERENCE / "cells.json"

@@ -216,7 +216,6 @@ TEST(VertexSetsOfScenes, AreChecked) {
   Scene<float> copies = test.scene;
   copies.bodies[2].plans = folding<float>(Sheet(5), Numbers::any);  // equal, but not shared
   EXPECT_THROW(validate(copies), std::invalid_argument);
-  EXPECT_THROW(renumber_in_leaf_order(test.scene, {}), std::invalid_argument);
   // A second set gets a number of its own.
   Scene<float> two = panels<float>().scene;
   EXPECT_EQ(add_body_over(two, 1, "again", two.bodies[1].primitives), 3u);
@@ -230,6 +229,44 @@ TEST(VertexSetsOfScenes, AreChecked) {
   EXPECT_EQ(add_body_over(largest, 1, "again", largest.bodies[1].primitives), 3u);
   EXPECT_TRUE(largest.same_vertices(1, 3));
   EXPECT_FALSE(largest.same_vertices(0, 1));
+}
+
+TYPED_TEST(VertexSets, KeepTheirPairsUnderOtherIds) {
+  using S = TypeParam;
+  for (const TestScene<S>& test : all_scenes<S>()) {
+    const Scene<S>& scene = test.scene;
+    const RenumberedScene<S> renumbered = renumber_in_leaf_order(scene, {.leaf_size = 4});
+    validate(renumbered.scene);
+    const auto& bodies = renumbered.scene.bodies;
+    for (std::uint32_t a = 0; a < bodies.size(); ++a) {
+      EXPECT_EQ(renumbered.old_vertex[a], renumbered.old_vertex[scene.first_of_set(a)]);
+      for (std::uint32_t b = 0; b < bodies.size(); ++b)
+        EXPECT_EQ(renumbered.scene.same_vertices(a, b), scene.same_vertices(a, b));
+      // New ids follow the leaves of the first body over the vertices.
+      std::uint32_t next = 0;
+      for (const std::uint32_t v : bodies[scene.first_of_set(a)].primitives.vertices) {
+        EXPECT_LE(v, next);
+        next = std::max(next, v + 1);
+      }
+    }
+    Playback<S> before(scene), after(renumbered.scene);
+    std::size_t all = 0;
+    for (const double t : test.frames) {
+      before.seek(t);
+      after.seek(t);
+      PairBuffer pairs = brute_force_pairs(renumbered.scene, after);
+      for (PrimitivePair& pair : pairs) {
+        pair.primitive_a = renumbered.old_primitive[pair.body_a][pair.primitive_a];
+        pair.primitive_b = renumbered.old_primitive[pair.body_b][pair.primitive_b];
+        if (pair.body_a == pair.body_b && pair.primitive_a > pair.primitive_b)
+          std::swap(pair.primitive_a, pair.primitive_b);
+      }
+      sort_pairs(pairs);
+      all += pairs.size();
+      EXPECT_EQ(pairs, brute_force_pairs(scene, before)) << scene.name << " at " << t;
+    }
+    EXPECT_GT(all, 50u) << scene.name;
+  }
 }
 
 TEST(VertexSetsOfScenes, RefuseVerticesThatAnotherBodyUses) {

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <cstdint>
 #include <limits>
 #include <numeric>
 #include <set>
@@ -60,7 +62,8 @@ World handed_in(const Mesh<S>& mesh, double radius) {
 /// Returns how the pairs of a world differ from all pairs of grown boxes; empty if they do not. Adds their
 /// number to `found`.
 template <class S>
-std::string wrong_pairs(World& world, const Mesh<S>& mesh, S radius, std::size_t& found) {
+std::string wrong_pairs(World& world, const Mesh<S>& mesh, const Elements& elements, S radius,
+                        std::size_t& found) {
   std::vector<WorldPair> pairs, truth;
   world.pairs(pairs);
   found += pairs.size();
@@ -68,12 +71,17 @@ std::string wrong_pairs(World& world, const Mesh<S>& mesh, S radius, std::size_t
   for (const WorldPair& pair : pairs)
     if (!of_kind[pair.body_a == 2 ? 1 : 0].insert({pair.primitive_a, pair.primitive_b}).second)
       return "a pair twice";
-  if (of_kind[0] != broad_phase::brute_force(mesh, CandidateKind::face_vertex, radius))
+  const std::vector<Box<S>> boxes = broad_phase::vertex_boxes(mesh, radius);
+  if (of_kind[0] != broad_phase::brute_force(elements, CandidateKind::face_vertex, boxes))
     return "wrong pairs of faces and vertices";
-  if (of_kind[1] != broad_phase::brute_force(mesh, CandidateKind::edge_edge, radius))
+  if (of_kind[1] != broad_phase::brute_force(elements, CandidateKind::edge_edge, boxes))
     return "wrong pairs of edges";
   world.true_pairs(truth);
   return truth.size() == pairs.size() ? "" : "other true pairs";
+}
+template <class S>
+std::string wrong_pairs(World& world, const Mesh<S>& mesh, S radius, std::size_t& found) {
+  return wrong_pairs(world, mesh, mesh.elements(), radius, found);
 }
 
 template <class S>
@@ -181,6 +189,109 @@ TYPED_TEST(WorldRadius, PlaysKnownMotion) {
   }
 }
 
+/// Removes some faces, vertices and edges, which are the bodies 0, 1 and 2, and inserts others.
+WorldEdit random_edit(Elements& elements, Random& random) {
+  WorldEdit edit;
+  constexpr Element of_body[] = {Element::face, Element::vertex, Element::edge};
+  for (std::uint32_t body = 0; body < 3; ++body) {
+    Primitives& list = elements.lists[std::size_t(of_body[body])];
+    std::set<std::uint32_t> gone;
+    for (int i = 0; i < 8; ++i)
+      if (const std::uint32_t id = random.below(list.count()); list.alive(id)) gone.insert(id);
+    for (const std::uint32_t id : gone) {
+      edit.removed_primitives.push_back({body, id});
+      list.remove(id);
+    }
+    for (int i = 0; i < 4; ++i) {
+      Ids vertices;
+      for (std::size_t c = 0; c <= std::size_t(of_body[body]); ++c)
+        vertices.push_back(random.below(elements.vertex_count() / 2));
+      edit.primitives.push_back({body, vertices});
+    }
+  }
+  for (const WorldEdit::Primitive& added : edit.primitives)
+    elements.lists[std::size_t(of_body[added.body])].add(added.vertices);
+  return edit;
+}
+
+template <class S>
+bool takes_edits(const StrategyEntry& entry) {
+  const auto& kinds = entry.info.primitives;
+  return entry.info.guarantee == Guarantee::exact && entry.info.can.geometry_changes &&
+         entry.info.can.self_pairs && entry.factory<S>() != nullptr && entry.info.max_primitive_pairs == 0 &&
+         std::find(kinds.begin(), kinds.end(), PrimitiveKind::control_nets) != kinds.end();
+}
+
+TYPED_TEST(WorldRadius, PrimitivesComeAndGo) {
+  using S = TypeParam;
+  const S radius = S(0.1);
+  std::size_t took_part = 0;
+  for (const StrategyEntry& entry : registry()) {
+    if (!takes_edits<S>(entry) || entry.info.foresight != Foresight::none) continue;
+    ++took_part;
+    Mesh<S> mesh = broad_phase::crumpled<S>(9, 1);
+    World world = handed_in(mesh, double(radius));
+    world.start(entry.info.id);
+    Elements elements = mesh.elements();
+    Random random(4);
+    std::size_t found = 0;
+    for (std::uint32_t step = 1; step < 6; ++step) {
+      world.change_geometry(random_edit(elements, random));
+      EXPECT_EQ(wrong_pairs(world, mesh, elements, radius, found), "")
+          << entry.info.id << ", step " << step << ", edited";
+      // Seeded fault: the elements as they were.
+      EXPECT_NE(wrong_pairs(world, mesh, radius, found), "") << entry.info.id;
+      mesh.v0 = broad_phase::crumpled<S>(9, 1 + step).v0;
+      world.set_positions(0, std::span<const S>(mesh.v0));
+      world.advance(step);
+      EXPECT_EQ(wrong_pairs(world, mesh, elements, radius, found), "")
+          << entry.info.id << ", step " << step << ", moved";
+    }
+    EXPECT_GT(found, 1000u) << entry.info.id;
+    world.reset(0);
+    EXPECT_EQ(wrong_pairs(world, mesh, radius, found), "") << entry.info.id << ", the original geometry";
+  }
+  EXPECT_GE(took_part, 3u);
+}
+
+TYPED_TEST(WorldRadius, PrimitivesComeAndGoDuringKnownMotion) {
+  using S = TypeParam;
+  const Mesh<S> mesh = broad_phase::crumpled<S>(7, 1);
+  std::vector<S> keyframes = mesh.v0;
+  const std::vector<S> second = broad_phase::crumpled<S>(7, 2).v0;
+  keyframes.insert(keyframes.end(), second.begin(), second.end());
+  const std::vector<double> times{0, 1};
+  const auto listed = [](const std::vector<WorldPair>& pairs) {
+    std::set<std::array<std::uint32_t, 4>> set;
+    for (const WorldPair& pair : pairs)
+      set.insert(std::array{pair.body_a, pair.primitive_a, pair.body_b, pair.primitive_b});
+    return set;
+  };
+  std::size_t took_part = 0;
+  for (const StrategyEntry& entry : registry()) {
+    if (!takes_edits<S>(entry)) continue;
+    ++took_part;
+    World world(sizeof(S) == 4 ? Precision::float32 : Precision::float64);
+    const Ids faces(mesh.faces.begin(), mesh.faces.end());
+    world.add_body("faces", {faces}, times, std::span<const S>(keyframes));
+    add_elements(world, mesh, 0.1);
+    world.start(entry.info.id);
+    Elements elements = mesh.elements();
+    Random random(6);
+    for (const double t : {0.25, 0.5, 0.75, 1.0}) {
+      world.advance(t);
+      if (t < 0.7) world.change_geometry(random_edit(elements, random));
+      std::vector<WorldPair> pairs, truth;
+      world.pairs(pairs);
+      world.true_pairs(truth);
+      EXPECT_FALSE(pairs.empty());
+      EXPECT_EQ(listed(pairs), listed(truth)) << entry.info.id << ", t = " << t;
+      EXPECT_EQ(pairs.size(), truth.size()) << entry.info.id << ", t = " << t;
+    }
+  }
+  EXPECT_GE(took_part, 3u);
+}
+
 TYPED_TEST(WorldRadius, IsSeenIfForgotten) {
   using S = TypeParam;
   const Mesh<S> mesh = broad_phase::crumpled<S>(9, 1);
@@ -216,7 +327,16 @@ TEST(RadiusOfWorlds, SaysWhatItCannotDo) {
   EXPECT_THROW(world.within({}, balls), std::logic_error);
   EXPECT_THROW(world.contacts(1, contacts), std::logic_error);
   EXPECT_THROW(world.change_plans({}), std::logic_error);
-  EXPECT_THROW(world.change_geometry({}), std::logic_error);
+  WorldEdit vertices, removed_vertices, primitive;
+  vertices.vertices.push_back({});
+  removed_vertices.removed_vertices.push_back({0, 3});
+  EXPECT_THROW(world.change_geometry(vertices), std::logic_error);
+  EXPECT_THROW(world.change_geometry(removed_vertices), std::logic_error);
+  primitive.primitives.push_back({2, {24, 25}});
+  EXPECT_EQ(broad_phase::complaint([&] { world.change_geometry(primitive); }),
+            "geometry change: a new primitive of body 2 refers to vertex 25, but there are 25");
+  primitive.primitives[0] = {3, {0}};
+  EXPECT_THROW(world.change_geometry(primitive), std::invalid_argument);
 }
 
 }  // namespace

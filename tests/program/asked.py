@@ -1,5 +1,6 @@
 """Measures everything that a study can ask, and leads every record back to its question: by the plan in its `again`, by the
-explorer's command, and by its job. Each way must end at the record's key, and no two questions may share a key or a job.
+explorer's command, and by its job; scenes that options can name also by a command line. Each way must end at the record's key, and
+no two questions may share a key or a job.
 
 usage: asked.py KBVH
 """
@@ -23,7 +24,7 @@ SCENES = [
     {"name": "two shapes", "bodies": [{"shape": "sphere", "triangles": 80, "keyframes": 3, "step": [0.1, 0, 0]},
                                       {"shape": "sphere", "triangles": 60, "centre": [0.5, 0.1, 0]}]},  # only a plan can
 ]  # fmt: skip
-#: Scenes of bodies over the vertices of others: only a plan can name them.
+#: Scenes of bodies over the vertices of others: the explorer names them in a plan.
 ELEMENTS = [
     {"name": "candidates of a sheet", "radius": 0.05, "pairs": [["corners", "cloth"], ["cloth-edges", "cloth-edges"]],
      "bodies": [{"shape": "waving_sheet", "triangles": 98, "keyframes": 3, "name": "cloth"},
@@ -63,10 +64,28 @@ ASKED: dict[str, dict[str, Any]] = {
     "pairs with another parameter": {"strategies": [{"id": "bottom_up", "params": {"kernels": "portable"}}]},
     "pairs by another strategy": {"strategies": ["hybrid"]},
     "other vertex orders": {"scenes": [{**SCENES[0], "order": "shuffled", "seed": 5}, {**SCENES[1], "order": "renumbered"}]},
+    "other vertex orders of elements": {"scenes": [{**ELEMENTS[0], "order": "renumbered"}, {**ELEMENTS[1], "order": "shuffled"}]},
 }
+#: Command lines of scenes above, by the question and the place of the scene in it.
+SHEET = "--scene waving_sheet --triangles 200 --keyframes 3"
+BALL = "--body sphere:triangles=80,keyframes=3,step=0.1:0:0{} --body sphere:triangles=60,centre=0.5:0.1:0{}"
+SAID = {
+    ("pairs", 0): SHEET,
+    ("pairs", 1): "--name 'two shapes' " + BALL.format("", ""),
+    ("pairs within bodies", 0): f"{SHEET} --self",
+    ("pairs of elements", 0): "--name 'candidates of a sheet' --radius 0.05 --pairs corners:cloth,cloth-edges:cloth-edges "
+                              "--body waving_sheet:triangles=98,keyframes=3,name=cloth --body elements=vertices,of=cloth,name=corners "
+                              "--body elements=edges,of=cloth",
+    ("pairs of elements", 1): "--name 'edges of a ball' " + BALL.format(",name=ball", "") + " --body elements=edges,of=ball",
+    ("pairs within a radius", 0): f"{SHEET} --radius 0.05",
+    ("pairs within a radius", 1): "--name 'two shapes' --radius 0.05 " + BALL.format("", ""),
+    ("pairs within a larger radius", 0): f"{SHEET} --radius=1e-1",
+    ("other vertex orders", 0): f"{SHEET} --order shuffled --seed 5",
+}  # fmt: skip
 #: Options of `kbvh run` that the questions above cover, and others, which choose scenes or do not measure.
-COVERED = {"--continuous", "--changes", "--rays", "--within", "--kernels", "--self", "--order", "--seed", "--strategies", "--param", "--builder",
-           "--width", "--leaf-size", "--l", "--scalar", "--repetitions", "--interval-width", "--seconds", "--frames-limit", "--oracle-every"}  # fmt: skip
+COVERED = {"--continuous", "--changes", "--rays", "--within", "--kernels", "--self", "--pairs", "--radius", "--order", "--seed", "--strategies",
+           "--param", "--builder", "--width", "--leaf-size", "--l", "--scalar", "--repetitions", "--interval-width", "--seconds", "--frames-limit",
+           "--oracle-every"}  # fmt: skip
 OTHERS = {"--help", "--scene", "--body", "--clip", "--name", "--triangles", "--obstacle", "--keyframes", "--script", "--out", "--plan",
           "--study", "--print-plan", "--names", "--list-jobs", "--prepare", "--job"}  # fmt: skip
 
@@ -128,6 +147,11 @@ class Asker:
                 self.run(re.sub(r"^kbvh", f"'{self.program}'", text, flags=re.M), what)
                 made = self.records(self.folder / "again" / "results.jsonl")
                 require([r["key"] for r in made] == [key], f"{what}: the explorer's command measures something else:\n{text}")
+        for (_, place), said in ((at, words) for at, words in SAID.items() if at[0] == what):
+            shutil.rmtree(self.folder / "said", ignore_errors=True)
+            self.run(f"'{self.program}' run {said} --strategies bottom_up --l 2 --repetitions 2 --out said", what)
+            made = self.records(self.folder / "said" / "results.jsonl")
+            require([r["key"] for r in made] == [keys[place]], f"{what}: the command line measures something else: {said}")
         jobs = [job["id"] for job in json.loads(self.run(f"'{self.program}' run --plan out.json --list-jobs", what))["jobs"]]
         shutil.rmtree(self.folder / "jobs", ignore_errors=True)
         for job in jobs:
@@ -143,6 +167,7 @@ def main() -> int:
         options = set(re.findall(r"^ +(?:-\w,)?(--[\w-]+)", asker.run(f"'{sys.argv[1]}' run --help", "help"), flags=re.M))
         require(options == COVERED | OTHERS, f"options that no question covers, or that are gone: {options ^ (COVERED | OTHERS)}. "
                 "One that says what is measured belongs to COVERED, with a question in ASKED; any other to OTHERS.")
+        require({what for what, _ in SAID} <= set(ASKED), f"command lines of no question: {({what for what, _ in SAID} - set(ASKED))}")
         owner: dict[str, str] = {}
         for what, asked in ASKED.items():
             keys, jobs = asker.lead_back(what, {**PLAIN, **asked})
@@ -150,7 +175,8 @@ def main() -> int:
                 require(one not in owner, f"{what} and {owner.get(one)} share {one}")
                 owner[one] = what
         print(f"{len(ASKED)} questions lead back to themselves by their plans, "
-              + ("by the explorer's commands, " if asker.node else "(no node: not by the explorer's commands) ") + "and by their jobs.")  # fmt: skip
+              + ("by the explorer's commands, " if asker.node else "(no node: not by the explorer's commands) ")
+              + f"and by their jobs, {len(SAID)} of their scenes by options.")  # fmt: skip
     return 0
 
 

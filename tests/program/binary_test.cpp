@@ -121,6 +121,13 @@ TEST_F(Binary, ShowsAndExportsAScene) {
   std::size_t faces = 0;
   for (std::size_t at = text.find("\nf "); at != std::string::npos; at = text.find("\nf ", at + 1)) ++faces;
   EXPECT_EQ(faces, 160u);
+  for (const char* out : {"thrown", "thrown.json"}) {
+    const Outcome thrown = kbvh(std::string("scene thrown_cloth --triangles 50 --keyframes 3 --out ") + out);
+    EXPECT_EQ(thrown.code, 0) << thrown.err;
+    EXPECT_NE(thrown.err.find("curves between keyframes, which '" + std::string(out) + "' does not hold"),
+              std::string::npos)
+        << thrown.err;
+  }
   EXPECT_EQ(kbvh("scene nowhere").code, 2);
 }
 

@@ -1,11 +1,16 @@
 // Scene cards: counts, and shares of realisers against a plain search over every node.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
+#include <utility>
 #include <vector>
 
+#include "core/base/hasher.hpp"
 #include "core/topology/builders.hpp"
+#include "experiments/common/text.hpp"
+#include "experiments/scenes/curves.hpp"
 #include "experiments/scenes/lab_scene.hpp"
 #include "experiments/scenes/scene_card.hpp"
 #include "experiments/scenes/shapes.hpp"
@@ -80,6 +85,37 @@ TEST(SceneCard, SharesEqualAPlainSearch) {
   EXPECT_GT(card.sides_changed, 0);
   EXPECT_DOUBLE_EQ(card.sides_changed, mean);
   EXPECT_DOUBLE_EQ(card.most_sides_changed, most);
+}
+
+TEST(SceneCard, HashesSeeCurvesBetweenKeyframes) {
+  const auto hash_of_mesh = [](const io::AnimatedMesh& mesh) { return card_hash(scene_of({mesh})); };
+  const io::AnimatedMesh flight = scenes::thrown_cloth({.triangles = 50, .keyframes = 3});
+  ASSERT_EQ(flight.bends.size(), 2u);
+  io::AnimatedMesh lines = flight, bent = flight, twisted = flight, turned = flight;
+  lines.bends.clear();
+  bent.bends[1].bend[7] += 0.5;
+  twisted.bends[0].twist[4] += 0.5;
+  std::swap(turned.bends[0], turned.bends[1]);
+  std::vector<std::uint64_t> hashes;
+  for (const io::AnimatedMesh& mesh : std::vector<io::AnimatedMesh>{flight, lines, bent, twisted, turned}) {
+    EXPECT_EQ(std::count(hashes.begin(), hashes.end(), hash_of_mesh(mesh)), 0);
+    hashes.push_back(hash_of_mesh(mesh));
+  }
+}
+
+// Folders of pictures that were written before keep their names.
+TEST(SceneCard, HashesOfScenesWithoutCurvesAreThoseOfTheirKeyframes) {
+  const LoadedScene scene = scene_of({scenes::random_soup(4, 3, 2)});
+  const io::AnimatedMesh& mesh = scene.meshes[0];
+  Hasher hasher;
+  hasher.mix(std::uint64_t(scene.order));
+  hasher.mix(hash_of(mesh.name));
+  hasher.mix(std::uint64_t(mesh.kind));
+  hasher.list(mesh.primitive_offsets);
+  hasher.list(mesh.primitive_vertices);
+  hasher.list(mesh.keyframe_times);
+  hasher.list(mesh.positions);
+  EXPECT_EQ(card_hash(scene), hasher.value());
 }
 
 TEST(LabScene, HoldsWhatTheSceneIs) {

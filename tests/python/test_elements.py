@@ -123,6 +123,20 @@ class Candidates(unittest.TestCase):
         world.pairs()
         self.assertGreater(world.audit(2).protrusion, 0)
 
+    def test_of_edges_that_come_and_go(self):
+        v, _, faces = sheet(10, 1)
+        world = kbvh.World(elements_of(v, faces), "bottom_up", precision="float64", radius=0.125)
+        edges = rows(world.scene.bodies[2])
+        gone, added = {0, 5, 17}, [[0, 99], [12, 40]]
+        before = found(world)
+        world.change_geometry(primitives={2: added}, removed_primitives={2: sorted(gone)})
+        all_edges = all_pairs("edge_edge", v, np.vstack([edges, added]), faces, 0.125)
+        expected = {pair for pair in all_edges if not gone & set(pair)}
+        self.assertTrue(any(pair[1] >= len(edges) for pair in expected))
+        self.assertEqual(found(world), (before[0], expected))
+        with self.assertRaisesRegex(ValueError, "a new primitive of body 2 refers to vertex 100, but there are 100"):
+            world.change_geometry(primitives={2: [[0, 100]]})
+
     def test_of_exact_intersections_without_a_radius(self):
         # An edge through a face of the same vertex set; a second edge has a vertex of the face.
         v = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.2, 0.2, -1], [0.2, 0.2, 1]], dtype="f4")
@@ -182,7 +196,7 @@ class Wrong(unittest.TestCase):
             lambda: world.within([[0, 0, 0]], 1),
             lambda: world.contacts(1),
             lambda: world.change_plans(kbvh.PlanChange(0, 0, [0], zero)),
-            lambda: world.change_geometry(removed_primitives={0: [0]}),
+            lambda: world.change_geometry(vertices={0: (zero, zero)}),
         ):
             with self.assertRaisesRegex(RuntimeError, "a world with a radius consists of boxes"):
                 call()

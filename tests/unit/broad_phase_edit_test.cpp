@@ -259,6 +259,53 @@ TYPED_TEST(BroadPhaseEdits, InsertedElementsHaveGroups) {
   }
 }
 
+// Groups that are set for one kind do not end those that another kind has from its vertices.
+TYPED_TEST(BroadPhaseEdits, InsertedFacesHaveTheGroupsOfTheirVerticesWhateverOtherKindsHave) {
+  using S = TypeParam;
+  const Mesh<S> mesh = crumpled<S>(12, 7);
+  const auto vertices = std::uint32_t(mesh.vertex_count());
+  enum class Later { edges, vertices, no_vertices };
+  for (const Later later : {Later::edges, Later::vertices, Later::no_vertices}) {
+    Edited<S> edited(mesh, S(0.3));
+    const std::uint32_t faces = edited.elements().count(Element::face);
+    std::vector<GroupMask> of_vertices, of_faces;
+    for (std::uint32_t v = 0; v < vertices; ++v)
+      of_vertices.push_back(2 * v < vertices ? GroupMask{2, 4} : GroupMask{4, 2});
+    const auto add_groups_of_faces = [&] {
+      while (of_faces.size() < edited.elements().count(Element::face)) {
+        GroupMask all{0, 0};
+        for (const std::uint32_t v :
+             edited.elements().vertices(Element::face, std::uint32_t(of_faces.size())))
+          all |= of_vertices[v];
+        of_faces.push_back(all);
+      }
+    };
+    add_groups_of_faces();
+    edited.broad.set_vertex_groups(of_vertices);
+    if (later == Later::edges) {
+      edited.broad.set_groups(
+          Element::edge, std::vector<GroupMask>(edited.elements().count(Element::edge), GroupMask{4, 4}));
+    } else {
+      of_vertices.assign(vertices, later == Later::vertices ? GroupMask{2, 6} : GroupMask{});
+      edited.broad.set_groups(Element::vertex,
+                              later == Later::vertices ? of_vertices : std::vector<GroupMask>());
+    }
+    Mesh<S> part;
+    part.faces = {0, 13, 140};
+    edited.insert(part);
+    add_groups_of_faces();
+    Pairs expected = edited.expected(CandidateKind::face_face);
+    std::erase_if(expected,
+                  [&](const Candidate& pair) { return !of_faces[pair.first].admits(of_faces[pair.second]); });
+    const bool of_inserted = std::any_of(expected.begin(), expected.end(),
+                                         [&](const Candidate& pair) { return pair.second >= faces; });
+    EXPECT_EQ(of_inserted, later != Later::no_vertices);
+    EXPECT_EQ(difference(edited.broad.candidates(CandidateKind::face_face), expected, edited.elements(),
+                         CandidateKind::face_face),
+              "");
+  }
+}
+
 TYPED_TEST(BroadPhaseEdits, WrongEditsAreNamedAndChangeNothing) {
   using S = TypeParam;
   Edited<S> edited(crumpled<S>(6, 7), S(0.1));

@@ -189,6 +189,28 @@ TYPED_TEST(BroadPhases, UpdatesOfMovedVerticesEqualUpdatesOfAll) {
   }
 }
 
+TYPED_TEST(BroadPhases, TreesThatUpdatesOfSomeVerticesSpoiltAreBuiltAgain) {
+  using S = TypeParam;
+  Mesh<S> mesh = crumpled<S>(12, 5);
+  BroadPhase<S> broad;
+  mesh.build(broad, S(0.05));
+  ASSERT_EQ(wrong_candidates(broad, mesh, S(0.05)), "");
+  Random random(3);
+  const auto vertices = std::uint32_t(mesh.vertex_count());
+  for (std::uint32_t part = 0; part < 8; ++part) {
+    std::vector<std::uint32_t> moved;
+    for (std::uint32_t v = part; v < vertices; v += 8) moved.push_back(v);
+    for (const std::uint32_t v : moved)
+      for (std::size_t k = 0; k < 3; ++k) mesh.v0[3 * v + k] = S(50 * random.unit());
+    broad.update(mesh.begin(), moved);
+  }
+  ASSERT_EQ(wrong_candidates(broad, mesh, S(0.05)), "");
+  for (const Element element : {Element::vertex, Element::edge, Element::face}) {
+    EXPECT_GE(broad.work(element).partial_refits, 1u);
+    EXPECT_EQ(broad.work(element).builds, 2u);
+  }
+}
+
 TYPED_TEST(BroadPhases, CandidatesHoldWithinABound) {
   using S = TypeParam;
   for (std::uint64_t seed = 0; seed < 6; ++seed) {
@@ -422,6 +444,8 @@ TYPED_TEST(BroadPhases, WrongInputIsNamedAndChangesNothing) {
   EXPECT_NE(complaint([&] { BroadPhase<S>(BroadPhaseSettings{.leaf_size = 4}); }), "");
   EXPECT_NE(complaint([&] { BroadPhase<S>(BroadPhaseSettings{.leaf_size = 17}); }), "");
   EXPECT_NE(complaint([&] { BroadPhase<S>(BroadPhaseSettings{.most_growth = 0.5}); }), "");
+  EXPECT_EQ(complaint([&] { BroadPhase<S>(BroadPhaseSettings{.kernels = KernelSet(99)}); }),
+            "kernels for '?' cannot run on this machine");
   broad.update(good.begin(), good.begin());
   EXPECT_NE(complaint([&] { broad.update(good.begin(), std::vector<std::uint32_t>{1}); }), "");
   EXPECT_EQ(wrong_candidates(broad, good, S(0.1)), "");

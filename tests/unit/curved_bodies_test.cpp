@@ -109,6 +109,11 @@ TEST(CurvedBodies, SmoothMotionHasNoJumpOfVelocity) {
   io::AnimatedMesh two = scenes::waving_sheet(8, 2);
   scenes::smooth(two);
   EXPECT_TRUE(two.bends.empty());
+  // Given curves are replaced, whatever the number of keyframes.
+  io::AnimatedMesh thrown = scenes::thrown_cloth({.triangles = 8, .keyframes = 2});
+  ASSERT_FALSE(thrown.bends.empty());
+  scenes::smooth(thrown);
+  EXPECT_TRUE(thrown.bends.empty());
 }
 
 TEST(CurvedBodies, CurvesFollowPlacementsAndOrders) {

@@ -181,7 +181,7 @@ function asks({ scene, bodies }) {
 
 function again({ record, scene, sceneName, bodies }) {
   const scenes = record.again?.scenes ?? [];
-  const options = [["builtin", "--scene"], ["triangles", "--triangles"], ["obstacle", "--obstacle"], ["keyframes", "--keyframes"], ["seed", ""], ["order", "--order"]];
+  const options = [["builtin", "--scene"], ["triangles", "--triangles"], ["obstacle", "--obstacle"], ["keyframes", "--keyframes"], ["radius", "--radius"], ["seed", ""], ["order", "--order"]];
   if (scenes.length === 1 && scenes[0] && typeof scenes[0] === "object" && !Array.isArray(scenes[0])) {
     const [one] = scenes;
     const known = new Set([...options.map(([key]) => key), "optional"]);
