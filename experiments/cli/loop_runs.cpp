@@ -29,7 +29,7 @@ namespace {
 /// The word for the finder that is no strategy.
 constexpr const char* own_finder = "broad_phase";
 
-void add_once(std::vector<std::string>& list, const std::string& value) {
+void add_if_new(std::vector<std::string>& list, const std::string& value) {
   if (std::find(list.begin(), list.end(), value) == list.end()) list.push_back(value);
 }
 
@@ -127,7 +127,7 @@ LiveEntry read_entry(JsonReader& keys) {
   for (const std::string& scene : keys.words("scene")) {
     if (std::find(known.begin(), known.end(), scene) == known.end())
       keys.fail("scene", no_such("scene", scene, known));
-    add_once(entry.scenes, scene);
+    add_if_new(entry.scenes, scene);
   }
   if (entry.scenes.empty()) entry.scenes.push_back(options.scene);
   entry.name = keys.word("name");
@@ -185,7 +185,7 @@ std::vector<LiveFinder> live_finders(const std::vector<StrategyRequest>& request
     }
     finders.push_back(std::move(finder));
   }
-  for (const std::string& note : left_out) add_once(notes, note);
+  for (const std::string& note : left_out) add_if_new(notes, note);
   if (finders.empty()) throw ConfigError("none of these strategies can find the pairs of a simulation");
   return finders;
 }
@@ -210,7 +210,7 @@ std::vector<LiveStudy> load_live_studies(const std::filesystem::path& plan, cons
       if (std::find(folders.begin(), folders.end(), folder) != folders.end())
         keys.fail("name", "two simulations are called " + io::printable(folder.string()));
       folders.push_back(folder);
-      add_once(names, name);
+      add_if_new(names, name);
       if (only.empty() || std::find(only.begin(), only.end(), name) != only.end())
         studies.push_back(study_of(entry, scene, out, notes));
     }

@@ -35,7 +35,7 @@ std::string memory_text(std::span<const LiveStep> steps) {
 
 /// Returns a number of each step.
 template <class Of>
-std::vector<double> numbers(std::span<const LiveStep> steps, const Of& of) {
+std::vector<double> each_of(std::span<const LiveStep> steps, const Of& of) {
   std::vector<double> list;
   for (const LiveStep& step : steps) list.push_back(of(step));
   return list;
@@ -89,7 +89,7 @@ void print_one(const LiveStudy& study, const LiveRun& one) {
   const LiveSteps& steps = one.steps;
   const std::size_t n = steps.each.size();
   const auto mean_of = [&](double LiveStep::*time) {
-    return mean_text(sum_of(numbers(steps.each, [&](const LiveStep& step) { return step.*time; })), n);
+    return mean_text(sum_of(each_of(steps.each, [&](const LiveStep& step) { return step.*time; })), n);
   };
   std::string found_by = one.finder.label;
   if (one.finder.strategy.id.empty()) found_by += std::string(", ") + loop::name(study.simulation.detection);
@@ -109,7 +109,7 @@ void print_one(const LiveStudy& study, const LiveRun& one) {
                  {"detection, ms", mean_of(&LiveStep::detect_ms)},
                  {"impacts, ms", mean_of(&LiveStep::impact_ms)},
                  {"rest, ms", mean_of(&LiveStep::rest_ms)},
-                 {"worst step, ms", fmt::format("{:.4g}", largest_of(numbers(steps.each, whole_of)))},
+                 {"worst step, ms", fmt::format("{:.4g}", largest_of(each_of(steps.each, whole_of)))},
                  {"memory, MB", memory_text(steps.each)}}));
   print("From iterates on, numbers are means over the " + counted(n, "step") +
         ", but for the worst step and the largest\nmemory, in the first and in the last tenth of these "
@@ -123,7 +123,7 @@ void print_several(const LiveStudy& study, const std::vector<LiveRun>& runs) {
   const auto of_common = [&](const LiveRun& one) {
     return std::span<const LiveStep>(one.steps.each).first(common);
   };
-  const auto detection = [&](const LiveRun& one) { return numbers(of_common(one), detection_of); };
+  const auto detection = [&](const LiveRun& one) { return each_of(of_common(one), detection_of); };
   double refit = 0;
   for (const LiveRun& one : runs) {
     if (!one.finder.baseline || common == 0) continue;
@@ -139,8 +139,8 @@ void print_several(const LiveStudy& study, const std::vector<LiveRun>& runs) {
     table.push_back({one.finder.label, std::to_string(one.steps.each.size()),
                      median_text(times) + ", " + ms_text(largest_of(times)),
                      refit > 0 && sum > 0 ? fmt::format("{:.2f}", refit / sum) : "-",
-                     median_text(numbers(of_common(one), others_of)),
-                     ms_text(largest_of(numbers(of_common(one), whole_of))), memory_text(one.steps.each),
+                     median_text(each_of(of_common(one), others_of)),
+                     ms_text(largest_of(each_of(of_common(one), whole_of))), memory_text(one.steps.each),
                      std::to_string(one.result.penetrations),
                      &one == &reference ? "-"
                      : differs          ? "differ at " + std::to_string(*differs)
@@ -220,7 +220,7 @@ void LiveTotals::add(const std::vector<LiveRun>& runs) {
     sum.penetrations += one.result.penetrations;
     sum.cut_short += one.result.too_near ? 1 : 0;
     sum.differing += first_difference(reference.steps, one.steps) ? 1 : 0;
-    sum.worst_ms = std::max(sum.worst_ms, largest_of(numbers(one.steps.each, whole_of)));
+    sum.worst_ms = std::max(sum.worst_ms, largest_of(each_of(one.steps.each, whole_of)));
   }
 }
 
