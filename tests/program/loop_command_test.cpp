@@ -5,11 +5,20 @@
 
 #include "binary.hpp"
 #include "experiments/cli/loop_runs.hpp"
+#include "experiments/results/table.hpp"
 
 namespace kbvh::experiments::loop_command_test {
 namespace {
 
 const std::string cloth = "loop --scene sphere --triangles 100 ";
+
+std::size_t longest_line_of(const std::string& out) {
+  std::size_t longest = 0, begin = 0;
+  for (std::size_t end = out.find('\n'); end != std::string::npos;
+       begin = end + 1, end = out.find('\n', begin))
+    longest = std::max(longest, end - begin);
+  return longest;
+}
 
 TEST_F(Binary, LoopRunsRecordsAndReplays) {
   const Outcome run = kbvh(cloth + "--steps 12 --record --frames 6 --out out");
@@ -60,13 +69,8 @@ TEST_F(Binary, LoopRunsRecordsAndReplays) {
   ASSERT_EQ(contestants.size(), 2u);
   EXPECT_EQ(contestants[0].at("scene").at("frames"), 9);
 
-  for (const std::string& out : {run.out, play.out, answered.out, clip.out}) {
-    std::size_t longest = 0, begin = 0;
-    for (std::size_t end = out.find('\n'); end != std::string::npos;
-         begin = end + 1, end = out.find('\n', begin))
-      longest = std::max(longest, end - begin);
-    EXPECT_LE(longest, 110u) << out;
-  }
+  for (const std::string& out : {run.out, play.out, answered.out, clip.out})
+    EXPECT_LE(longest_line_of(out), 110u) << out;
 }
 
 TEST_F(Binary, LoopComparesStrategies) {
@@ -75,6 +79,7 @@ TEST_F(Binary, LoopComparesStrategies) {
   for (const char* word : {"of sphere", "over refit", "states", "broad_phase", "bottom_up", "lbvh", "equal"})
     EXPECT_NE(run.out.find(word), std::string::npos) << word << "\n" << run.out;
   EXPECT_EQ(run.out.find("differ at"), std::string::npos) << run.out;
+  EXPECT_LE(longest_line_of(run.out), longest_line) << run.out;
   const std::vector<json> own = records("out/broad_phase/loop.jsonl");
   ASSERT_EQ(own.size(), 21u);
   EXPECT_TRUE(own[0].at("options").at("strategy").is_null());
