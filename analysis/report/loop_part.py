@@ -53,7 +53,7 @@ def loop_part(folder: Path, which: str, notes: list[str]) -> Optional[LoopPart]:
     if not simulations:
         return None
     made = []
-    for number, one in enumerate(simulations):
+    for number, one in enumerate(pictured(simulations)):
         if which != "none":
             try:
                 made.append(_pictures(one, folder, number))
@@ -63,17 +63,24 @@ def loop_part(folder: Path, which: str, notes: list[str]) -> Optional[LoopPart]:
     return LoopPart(HEAD, [_row(one) for one in simulations], broken, made)
 
 
+def pictured(simulations: list[Simulation]) -> list[Simulation]:
+    """Returns one simulation of each motion, the first that has frames, if any: finders that lose no pair draw the same pictures."""
+    chosen: dict[tuple[str, int, int], Simulation] = {}
+    for one in simulations:
+        if one.of not in chosen or (one.frames and not chosen[one.of].frames):
+            chosen[one.of] = one
+    return list(chosen.values())
+
+
 def _row(one: Simulation) -> tuple[str, ...]:
     steps = one.steps
     times = steps["detect_ms"] + steps["impact_ms"] + steps["rest_ms"]
-    tenth = (len(steps) + 9) // 10
-    memory = [steps["resident_bytes"].iloc[part].max() / 1e6 for part in (slice(None, tenth), slice(-tenth, None))]
     return (
         one.scene, text.size(one.triangles), one.detection, text.count(steps["step"].max()), text.count(one.penetrations),
         text.significant(1e3 * steps["smallest_gap_m"].min(), 2), text.count(steps["contacts"].max()),
         text.significant(steps["iterates"].mean(), 2), text.milliseconds(steps["detect_ms"].mean()),
         text.milliseconds(steps["impact_ms"].mean()), text.milliseconds(steps["rest_ms"].mean()), text.milliseconds(times.max()),
-        ", ".join(text.significant(one) for one in memory),
+        ", ".join(text.significant(megabytes) for megabytes in one.memory_mb),
     )  # fmt: skip
 
 

@@ -6,8 +6,10 @@
 #include <cctype>
 #include <chrono>
 #include <cstddef>
+#include <fstream>
 #include <optional>
 
+#include "experiments/cli/loop_tables.hpp"
 #include "experiments/cli/program.hpp"
 #include "experiments/common/json_reader.hpp"
 #include "experiments/common/output.hpp"
@@ -16,7 +18,6 @@
 #include "experiments/common/stopwatch.hpp"
 #include "experiments/common/text.hpp"
 #include "experiments/io/bytes.hpp"
-#include "experiments/results/table.hpp"
 #include "experiments/study/plan.hpp"
 
 namespace kbvh::experiments {
@@ -28,26 +29,34 @@ namespace {
 /// The word for the finder that is no strategy.
 constexpr const char* own_finder = "broad_phase";
 
-/// Returns the largest memory in the first tenth of the steps and in the last one, in MB: what a run needs at
-/// first, and whether it needs more and more.
-std::string memory_text(const std::vector<double>& megabytes) {
-  if (megabytes.empty()) return "-";
-  const auto tenth = std::ptrdiff_t((megabytes.size() + 9) / 10);
-  return fmt::format("{:.1f}, {:.1f}", *std::max_element(megabytes.begin(), megabytes.begin() + tenth),
-                     *std::max_element(megabytes.end() - tenth, megabytes.end()));
+void add_if_new(std::vector<std::string>& list, const std::string& value) {
+  if (std::find(list.begin(), list.end(), value) == list.end()) list.push_back(value);
 }
 
-std::string mean_text(double sum, std::uint64_t steps) {
-  return steps == 0 ? "-" : fmt::format("{:.4g}", sum / double(steps));
-}
-
-/// Returns the first step that both made and after which their states differ.
-std::optional<std::uint64_t> first_difference(const StepSums& a, const StepSums& b) {
-  for (const auto& [step, state] : a.states) {
-    const auto other = b.states.find(step);
-    if (other != b.states.end() && other->second != state) return step;
+/// Shares a time among simulations: each next one gets an equal part of what is left.
+class TimeShares {
+ public:
+  TimeShares(double seconds, std::size_t simulations) : seconds_(seconds), left_(simulations) {}
+  /// Returns the seconds of the next simulation, positive; 0 if there is no limit.
+  double next() {
+    const double left = seconds_ - seconds_since(begin_), share = left / double(left_--);
+    return seconds_ > 0 ? std::max(share, 1e-9) : 0;
   }
-  return {};
+
+ private:
+  double seconds_;
+  std::size_t left_;
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+};
+
+/// Reads all steps that a folder of a simulation has.
+LiveSteps steps_in(const std::filesystem::path& folder) {
+  LiveSteps steps;
+  std::ifstream in(folder / "loop.jsonl");
+  std::string line;
+  std::getline(in, line);  // describes the simulation
+  while (std::getline(in, line)) steps.add(json::parse(line));
+  return steps;
 }
 
 LiveRun simulate_with(loop::SimulationOptions options, const LiveFinder& finder) {
@@ -58,13 +67,15 @@ LiveRun simulate_with(loop::SimulationOptions options, const LiveFinder& finder)
   std::uint64_t penetrations = 0;
   const auto begin = std::chrono::steady_clock::now();
   made.result = loop::simulate(options, [&](const json& record) {
-    made.sums.add(record);
+    if (options.folder.empty()) made.steps.add(record);
     penetrations += record["penetrations"].get<std::uint64_t>();
     const auto step = record["step"].get<std::uint64_t>();
-    left.made(options.steps - step, seconds_since(begin));
+    const double seconds = seconds_since(begin);
+    left.made(options.steps - step, seconds);
+    const double limit = options.most_seconds > 0 ? options.most_seconds - seconds : left.seconds();
     progress.show(fmt::format("{}{}, {}: step {} of {}, {} contacts, {} iterates, {:.1f} ms, {} penetrations",
-                              time_left_in_words(left.seconds()), options.scene, finder.label, step,
-                              options.steps, record["contacts"].get<std::uint64_t>(),
+                              time_left_in_words(std::min(limit, left.seconds())), options.scene,
+                              finder.label, step, options.steps, record["contacts"].get<std::uint64_t>(),
                               record["iterates"].get<std::uint64_t>(),
                               record["detect_ms"].get<double>() + record["impact_ms"].get<double>() +
                                   record["rest_ms"].get<double>(),
@@ -73,106 +84,8 @@ LiveRun simulate_with(loop::SimulationOptions options, const LiveFinder& finder)
   progress.clear();
   if (made.result.first_step > 0)
     say(finder.label + ": continued after step " + std::to_string(made.result.first_step));
+  if (!options.folder.empty()) made.steps = steps_in(options.folder);
   return made;
-}
-
-void print_one(const LiveStudy& study, const LiveRun& one) {
-  const StepSums& sums = one.sums;
-  const std::uint64_t n = sums.steps;
-  std::string found_by = one.finder.label;
-  if (one.finder.strategy.id.empty()) found_by += std::string(", ") + loop::name(study.simulation.detection);
-  print(columns({{"of " + study.title, ""},
-                 {"pairs found by", found_by},
-                 {"steps", std::to_string(one.result.state.step)},
-                 {"penetrations", std::to_string(one.result.penetrations)},
-                 {"stalled steps", std::to_string(one.result.stalled)},
-                 {"unconverged steps", std::to_string(one.result.unconverged)},
-                 {"most contacts", std::to_string(sums.most_contacts)},
-                 {"smallest gap, mm", fmt::format("{:.3g}", 1e3 * sums.smallest_gap)},
-                 {"largest lag, mm", fmt::format("{:.3g}", 1e3 * sums.largest_lag)},
-                 {"iterates", mean_text(double(sums.iterates), n)},
-                 {"orders", mean_text(double(sums.orders), n)},
-                 {"searches", mean_text(double(sums.searches), n)},
-                 {"candidates", mean_text(double(sums.candidates), n)},
-                 {"detection, ms", mean_text(sums.detect_ms, n)},
-                 {"impacts, ms", mean_text(sums.impact_ms, n)},
-                 {"rest, ms", mean_text(sums.rest_ms, n)},
-                 {"worst step, ms", fmt::format("{:.4g}", sums.worst_ms)},
-                 {"memory, MB", memory_text(sums.resident_mb)}}));
-  print("From iterates on, numbers are means over the " + counted(n, "step") +
-        " made now, but for the worst step and the largest\nmemory, in the first and in the last tenth of "
-        "these steps.\n");
-}
-
-/// Returns the run with which the others are compared: the first exact one, else the first.
-const LiveRun& reference_of(const std::vector<LiveRun>& runs) {
-  for (const LiveRun& one : runs)
-    if (one.finder.exact) return one;
-  return runs.front();
-}
-
-/// Returns the shortest mean detection of a baseline in ms; 0 if there is none.
-double best_refit_ms(const std::vector<LiveRun>& runs) {
-  double best = 0;
-  for (const LiveRun& one : runs) {
-    if (!one.finder.baseline || one.sums.steps == 0) continue;
-    const double mean = one.sums.detect_ms / double(one.sums.steps);
-    if (best == 0 || mean < best) best = mean;
-  }
-  return best;
-}
-
-void print_several(const LiveStudy& study, const std::vector<LiveRun>& runs) {
-  const double best = best_refit_ms(runs);
-  const LiveRun& reference = reference_of(runs);
-  std::vector<std::vector<std::string>> table{{"of " + study.title, "detection, ms", "over refit",
-                                               "impacts, ms", "rest, ms", "worst, ms", "penetrations",
-                                               "states"}};
-  for (const LiveRun& one : runs) {
-    const StepSums& sums = one.sums;
-    const std::uint64_t n = sums.steps;
-    const std::optional<std::uint64_t> differs = first_difference(reference.sums, sums);
-    table.push_back(
-        {one.finder.label, mean_text(sums.detect_ms, n),
-         best > 0 && sums.detect_ms > 0 ? fmt::format("{:.2f}", best * double(n) / sums.detect_ms) : "-",
-         mean_text(sums.impact_ms, n), mean_text(sums.rest_ms, n), fmt::format("{:.4g}", sums.worst_ms),
-         std::to_string(one.result.penetrations),
-         &one == &reference ? "-"
-         : differs          ? "differ at " + std::to_string(*differs)
-                            : "equal"});
-  }
-  print(columns(table, longest_line));
-  print(
-      "Times are means over the steps made now, but for the worst step. Over refit: detection of the "
-      "table's\n"
-      "fastest refit over that of the line. States: those after every step, compared with those of\n" +
-      reference.finder.label + ".\n");
-}
-
-/// Says what is wrong with runs, and returns the exit code.
-int judge(const std::vector<LiveRun>& runs) {
-  int code = success;
-  const LiveRun& reference = reference_of(runs);
-  for (const LiveRun& one : runs) {
-    const std::string whose = runs.size() > 1 ? one.finder.label + ": " : "";
-    if (one.result.penetrations > 0) {
-      say(whose + counted(one.result.penetrations, "pair") + " of triangles penetrated, first after step " +
-          std::to_string(one.result.first_penetration));
-      code = guarantee_broken;
-    }
-    if (one.result.too_near) {
-      say(whose + "ended after step " + std::to_string(one.result.state.step) +
-          ", which left two surfaces nearer than their thickness: a pair had been lost");
-      code = guarantee_broken;
-    }
-    const std::optional<std::uint64_t> differs = first_difference(reference.sums, one.sums);
-    if (differs && one.finder.exact && reference.finder.exact) {
-      say(whose + "another trajectory than " + reference.finder.label + ", from step " +
-          std::to_string(*differs) + " on");
-      code = guarantee_broken;
-    }
-  }
-  return code;
 }
 
 /// Returns a label as the name of a folder.
@@ -186,30 +99,67 @@ std::string folder_name(const std::string& label) {
   return name;
 }
 
-}  // namespace
+/// An entry of the list "live": one scene or several, with the same finders.
+struct LiveEntry {
+  std::optional<std::string> name;
+  std::vector<std::string> scenes;
+  loop::SimulationOptions simulation;
+  std::vector<StrategyRequest> requests;
+  Sweep params;
+  std::string place;  ///< in the plan
 
-void StepSums::add(const json& record) {
-  const double detect = record["detect_ms"], impact = record["impact_ms"], rest = record["rest_ms"],
-               gap = record["smallest_gap_m"];
-  smallest_gap = steps == 0 ? gap : std::min(smallest_gap, gap);
-  ++steps;
-  iterates += record["iterates"].get<std::uint64_t>();
-  orders += record["orders"].get<std::uint64_t>();
-  largest_lag = std::max(largest_lag, record["lag_m"].get<double>());
-  resident_mb.push_back(record["resident_bytes"].get<double>() / 1e6);
-  states[record["step"].get<std::uint64_t>()] = record["state"].get<std::string>();
-  questions += record["questions"].get<std::uint64_t>();
-  searches += record["searches"].get<std::uint64_t>();
-  candidates += record["candidates"].get<std::uint64_t>();
-  most_contacts = std::max(most_contacts, record["contacts"].get<std::uint64_t>());
-  detect_ms += detect;
-  impact_ms += impact;
-  rest_ms += rest;
-  worst_ms = std::max(worst_ms, detect + impact + rest);
+  const std::string& name_of(const std::string& scene) const { return name ? *name : scene; }
+  bool has_folder_of_scenes() const { return name && scenes.size() > 1; }
+  std::string title_of(const std::string& scene) const {
+    return has_folder_of_scenes() ? *name + ", " + scene : name_of(scene);
+  }
+  std::filesystem::path folder_of(const std::string& scene) const {
+    const std::filesystem::path folder = folder_name(name_of(scene));
+    return has_folder_of_scenes() ? folder / scene : folder;
+  }
+};
+
+LiveEntry read_entry(JsonReader& keys) {
+  LiveEntry entry;
+  entry.place = keys.place();
+  loop::SimulationOptions& options = entry.simulation;
+  const std::vector<std::string>& known = loop::scene_names();
+  for (const std::string& scene : keys.words("scene")) {
+    if (std::find(known.begin(), known.end(), scene) == known.end())
+      keys.fail("scene", no_such("scene", scene, known));
+    add_if_new(entry.scenes, scene);
+  }
+  if (entry.scenes.empty()) entry.scenes.push_back(options.scene);
+  entry.name = keys.word("name");
+  options.triangles = keys.whole("triangles", live_triangles).value_or(options.triangles);
+  options.seed = keys.whole("seed", ranges::any).value_or(options.seed);
+  options.steps = keys.whole("steps", live_steps).value_or(options.steps);
+  for (const std::string& word : keys.words("strategies")) entry.requests.push_back({word, {}, {}});
+  if (const json* given = keys.find("params")) entry.params = read_params(*given, keys.place() + ": params");
+  keys.finish();
+  return entry;
 }
 
+LiveStudy study_of(const LiveEntry& entry, const std::string& scene, const std::filesystem::path& out,
+                   std::vector<std::string>& notes) {
+  LiveStudy study{entry.title_of(scene), entry.simulation, {}};
+  loop::SimulationOptions& options = study.simulation;
+  options.scene = scene;
+  if (!out.empty()) options.folder = out / entry.folder_of(scene);
+  try {
+    const loop::ContactMesh mesh(loop::make_scene(scene, options.triangles, options.seed).mesh);
+    study.finders = live_finders(entry.requests, entry.params, mesh, notes);
+  } catch (const ConfigError& problem) {
+    throw io::InputError(entry.place + ": " + problem.what());
+  }
+  if (study.finders.empty()) study.finders.emplace_back();
+  return study;
+}
+
+}  // namespace
+
 std::vector<LiveFinder> live_finders(const std::vector<StrategyRequest>& requests, const Sweep& params,
-                                     const loop::SimulationOptions& simulation) {
+                                     const loop::ContactMesh& mesh, std::vector<std::string>& notes) {
   std::vector<LiveFinder> finders;
   std::vector<StrategyRequest> strategies;
   for (const StrategyRequest& request : requests) {
@@ -219,11 +169,8 @@ std::vector<LiveFinder> live_finders(const std::vector<StrategyRequest>& request
       finders.emplace_back();
   }
   if (strategies.empty() && params.empty()) return finders;
-  std::vector<std::string> notes;
-  const std::vector<ContestantSpec> chosen = expand(strategies, params, {}, notes);
-  const loop::ContactMesh mesh(
-      loop::make_scene(simulation.scene, simulation.triangles, simulation.seed).mesh);
-  for (const ContestantSpec& spec : chosen) {
+  std::vector<std::string> left_out;
+  for (const ContestantSpec& spec : expand(strategies, params, {}, left_out)) {
     const Info& info = spec.entry->info;
     LiveFinder finder{
         spec.label, {info.id, spec.given}, info.guarantee != Guarantee::approximate, info.baseline};
@@ -233,69 +180,72 @@ std::vector<LiveFinder> live_finders(const std::vector<StrategyRequest>& request
       const bool by_id = std::any_of(strategies.begin(), strategies.end(),
                                      [&](const StrategyRequest& request) { return request.id == info.id; });
       if (by_id) throw;
-      notes.push_back(std::string(problem.what()) + ": left out");
+      left_out.push_back(std::string(problem.what()) + ": left out");
       continue;
     }
     finders.push_back(std::move(finder));
   }
-  for (const std::string& note : notes) say(note);
+  for (const std::string& note : left_out) add_if_new(notes, note);
   if (finders.empty()) throw ConfigError("none of these strategies can find the pairs of a simulation");
   return finders;
 }
 
-std::vector<LiveStudy> load_live_studies(const std::filesystem::path& plan,
-                                         const std::filesystem::path& out) {
+std::vector<LiveStudy> load_live_studies(const std::filesystem::path& plan, const std::filesystem::path& out,
+                                         const std::vector<std::string>& only) {
   const std::string place = plan.string();
   const json said = parse_json(io::read_file(plan), place);
   if (!said.is_object() || !said.contains("live"))
     throw io::InputError(place + ": has no simulations, a list \"live\"");
   std::vector<LiveStudy> studies;
+  std::vector<std::string> names, notes;
+  std::vector<std::filesystem::path> folders;
   JsonReader whole(said, place);
+  std::size_t count = 0;
   for (const json& one : whole.list("live")) {
-    JsonReader keys(one, place + ": live[" + std::to_string(studies.size()) + "]");
-    LiveStudy study;
-    loop::SimulationOptions& options = study.simulation;
-    options.scene = keys.word("scene").value_or(options.scene);
-    const std::vector<std::string>& known = loop::scene_names();
-    if (std::find(known.begin(), known.end(), options.scene) == known.end())
-      keys.fail("scene", no_such("scene", options.scene, known));
-    study.title = keys.word("name").value_or(options.scene);
-    const std::string folder = folder_name(study.title);
-    for (const LiveStudy& other : studies)
-      if (folder_name(other.title) == folder)
-        keys.fail("name", "two simulations are called " + io::printable(folder));
-    if (!out.empty()) options.folder = out / folder;
-    options.triangles = keys.whole("triangles", live_triangles).value_or(options.triangles);
-    options.seed = keys.whole("seed", ranges::any).value_or(options.seed);
-    options.steps = keys.whole("steps", live_steps).value_or(options.steps);
-    std::vector<StrategyRequest> requests;
-    for (const std::string& word : keys.words("strategies")) requests.push_back({word, {}, {}});
-    Sweep params;
-    if (const json* given = keys.find("params")) params = read_params(*given, keys.place() + ": params");
-    keys.finish();
-    try {
-      study.finders = live_finders(requests, params, options);
-    } catch (const ConfigError& problem) {
-      throw io::InputError(keys.place() + ": " + problem.what());
+    JsonReader keys(one, place + ": live[" + std::to_string(count++) + "]");
+    const LiveEntry entry = read_entry(keys);
+    for (const std::string& scene : entry.scenes) {
+      const std::string& name = entry.name_of(scene);
+      const std::filesystem::path folder = entry.folder_of(scene);
+      if (std::find(folders.begin(), folders.end(), folder) != folders.end())
+        keys.fail("name", "two simulations are called " + io::printable(folder.string()));
+      folders.push_back(folder);
+      add_if_new(names, name);
+      if (only.empty() || std::find(only.begin(), only.end(), name) != only.end())
+        studies.push_back(study_of(entry, scene, out, notes));
     }
-    if (study.finders.empty()) study.finders.emplace_back();
-    studies.push_back(std::move(study));
   }
+  for (const std::string& name : only)
+    if (std::find(names.begin(), names.end(), name) == names.end())
+      throw io::InputError(place + ": live: " + no_such("study", name, names));
+  for (const std::string& note : notes) say(note);
   return studies;
 }
 
-int run_live(const LiveStudy& study) {
-  std::vector<LiveRun> runs;
-  for (const LiveFinder& finder : study.finders) {
-    loop::SimulationOptions options = study.simulation;
-    if (study.finders.size() > 1 && !options.folder.empty()) options.folder /= folder_name(finder.label);
-    runs.push_back(simulate_with(options, finder));
+int run_live(const std::vector<LiveStudy>& studies, double seconds) {
+  std::size_t simulations = 0;
+  for (const LiveStudy& study : studies) simulations += study.finders.size();
+  TimeShares shares(seconds, simulations);
+  LiveTotals totals;
+  int code = success;
+  for (const LiveStudy& study : studies) {
+    std::vector<LiveRun> runs;
+    for (const LiveFinder& finder : study.finders) {
+      loop::SimulationOptions options = study.simulation;
+      options.most_seconds = shares.next();
+      if (study.finders.size() > 1 && !options.folder.empty()) options.folder /= folder_name(finder.label);
+      runs.push_back(simulate_with(options, finder));
+    }
+    if (&study != &studies.front()) print("\n");
+    print_runs(study, runs);
+    code = std::max(code, judge(studies.size() > 1 ? study.title : "", runs));
+    totals.add(runs);
   }
-  if (runs.size() == 1)
-    print_one(study, runs.front());
-  else
-    print_several(study, runs);
-  return judge(runs);
+  if (studies.size() > 1) {
+    print("\n");
+    totals.print_table();
+  }
+  return code;
 }
 
 }  // namespace kbvh::experiments

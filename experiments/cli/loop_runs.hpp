@@ -1,8 +1,6 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
-#include <map>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -23,24 +21,6 @@ struct LiveFinder {
   bool baseline = false;              ///< Info::baseline
 };
 
-/// Sums of the lines of the steps that were made now.
-struct StepSums {
-  std::uint64_t steps = 0, iterates = 0, questions = 0, searches = 0, candidates = 0, most_contacts = 0;
-  std::uint64_t orders = 0;
-  double detect_ms = 0, impact_ms = 0, rest_ms = 0, worst_ms = 0, smallest_gap = 0, largest_lag = 0;
-  std::vector<double> resident_mb{};              ///< after each step
-  std::map<std::uint64_t, std::string> states{};  ///< hash of the state after a step
-
-  void add(const nlohmann::json& record);
-};
-
-/// A simulation whose pairs one finder found.
-struct LiveRun {
-  LiveFinder finder;
-  loop::SimulationResult result;
-  StepSums sums;
-};
-
 /// Simulations of one scene, one for each finder.
 struct LiveStudy {
   std::string title;  ///< for tables
@@ -50,19 +30,22 @@ struct LiveStudy {
 
 /// Returns the finders that are named: ids of strategies and the other words of StrategyRequest, and
 /// "broad_phase", which comes first. `params` are as for `expand`. Members of a family that do not suit are
-/// left out, with a message; throws ConfigError, in a sentence with the reason, for a strategy that is named
-/// by its id and does not suit the scene of `simulation`, and for words that name nothing.
+/// left out, with a sentence in `notes`, each once; throws ConfigError, in a sentence with the reason, for a
+/// strategy that is named by its id and does not suit the mesh, and for words that name nothing.
 std::vector<LiveFinder> live_finders(const std::vector<StrategyRequest>& requests, const Sweep& params,
-                                     const loop::SimulationOptions& simulation);
+                                     const loop::ContactMesh& mesh, std::vector<std::string>& notes);
 
-/// Reads the simulations of a plan, the list "live" (experiments/RESULTS.md); each has a folder of its name
-/// in `out`, unless that is empty. Throws io::InputError for a file without one, for unknown keys, wrong
-/// values and equal names, and with the messages of live_finders.
-std::vector<LiveStudy> load_live_studies(const std::filesystem::path& plan, const std::filesystem::path& out);
+/// Reads the simulations of a plan, the list "live" (experiments/RESULTS.md), or those with the names of
+/// `only`, if there are any. Each has a folder of its name in `out`, unless that is empty. Says the notes of
+/// live_finders. Throws io::InputError for a file without simulations, for unknown keys, wrong values, equal
+/// names and unknown names, and with the messages of live_finders.
+std::vector<LiveStudy> load_live_studies(const std::filesystem::path& plan, const std::filesystem::path& out,
+                                         const std::vector<std::string>& only = {});
 
-/// Runs the simulations, one after the other, prints a table, and returns the exit code: success, or
-/// guarantee_broken if triangles penetrated, or if trajectories of exact finders differ. Of several, each has
-/// a folder of its own in that of the simulation.
-int run_live(const LiveStudy& study);
+/// Runs the simulations, one after the other, prints a table for each scene and, of several, one of all, and
+/// returns the exit code: success, or guarantee_broken if triangles penetrated, or if trajectories of exact
+/// finders differ. `seconds`, unless 0, are those of all simulations: each gets an equal part of what is
+/// left. Of several finders, each has a folder of its own in that of the simulation.
+int run_live(const std::vector<LiveStudy>& studies, double seconds);
 
 }  // namespace kbvh::experiments

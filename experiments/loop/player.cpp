@@ -5,6 +5,7 @@
 #include <iterator>
 #include <memory>
 #include <tuple>
+#include <utility>
 
 #include "core/broad_phase/element_distance.hpp"
 #include "experiments/common/stopwatch.hpp"
@@ -18,31 +19,28 @@ using PairLists = std::vector<Candidate>[2];  // ascending, of contact_kinds
 /// One way to answer one question, and its last answer.
 class Contestant {
  public:
-  Contestant(const RecordingHeader& header, IterateQuestion question, Detection detection, double keep,
+  Contestant(const RecordingHeader& header, PlayedWay way, const ContactStrategy& strategy,
              std::uint32_t lose_every)
-      : header_(header),
-        detector_(header.mesh, {detection, keep * header.radius, header.radius, lose_every}) {
-    played.question = question;
-    played.detection = detection;
-    played.keep = keep;
-  }
+      : played(std::move(way)),
+        header_(header),
+        detector_(header.mesh,
+                  {played.detection, played.keep * header.radius, header.radius, lose_every, strategy}) {}
 
   void answer(const RecordedIterate& iterate) {
     const auto begin = std::chrono::steady_clock::now();
-    BroadPhase<double>& broad = detector_.broad();
     if (played.question == IterateQuestion::near)
       detector_.update(iterate.begin);
     else
       detector_.update(iterate.begin, iterate.end);
     for (int k = 0; k < 2; ++k) {
       if (played.question == IterateQuestion::near)
-        broad.within(contact_kinds[k], header_.radius, near_[k]);
+        detector_.broad().within(contact_kinds[k], header_.radius, near_[k]);
       else
-        candidates_[k] = broad.candidates(contact_kinds[k]);
+        candidates_[k] = detector_.candidates(contact_kinds[k]);
     }
-    if (played.question == IterateQuestion::impact) impact_ = broad.earliest_impact(header_.separation);
+    if (played.question == IterateQuestion::impact) impact_ = detector_.earliest_impact(header_.separation);
     played.seconds += seconds_since(begin);
-    played.searches = broad.detections();
+    played.searches = detector_.searches();
     for (int k = 0; k < 2; ++k) {
       const std::span<const Candidate> found =
           played.question == IterateQuestion::near ? span_of(near_[k]) : candidates_[k];
@@ -82,7 +80,7 @@ class Contestant {
     }
   }
 
-  PlayedWay played{};
+  PlayedWay played;
   PairLists pairs;
 
  private:
@@ -142,6 +140,27 @@ class Truth {
   Elements elements_;
 };
 
+/// Adds the ways that answer a question, as many for each that is asked; the way `refit` comes first.
+void add_ways(const RecordingHeader& header, IterateQuestion question, const PlaySettings& settings,
+              std::vector<std::unique_ptr<Contestant>>& ways) {
+  const auto add = [&](PlayedWay way, const ContactStrategy& strategy, std::uint32_t lose_every) {
+    ways.push_back(std::make_unique<Contestant>(header, std::move(way), strategy, lose_every));
+  };
+  if (!settings.strategies.empty()) {
+    if (question == IterateQuestion::near) return;
+    add({question, Detection::refit}, {}, 0);
+    for (const PlayedStrategy& one : settings.strategies) {
+      PlayedWay way{question, Detection::refit};
+      way.strategy = one.label;
+      way.exact = one.exact;
+      add(std::move(way), one.strategy, settings.lose_every);
+    }
+    return;
+  }
+  for (const Detection detection : {Detection::refit, Detection::rebuild}) add({question, detection}, {}, 0);
+  for (const double keep : settings.keep) add({question, Detection::kept, keep}, {}, settings.lose_every);
+}
+
 }  // namespace
 
 const char* name(IterateQuestion question) {
@@ -157,25 +176,20 @@ const char* name(IterateQuestion question) {
 }
 
 bool PlayResult::agree() const {
-  return std::all_of(ways.begin(), ways.end(),
-                     [](const PlayedWay& way) { return way.differences == 0 && way.lacking == 0; });
+  return std::all_of(ways.begin(), ways.end(), [](const PlayedWay& way) {
+    return !way.exact || (way.differences == 0 && way.lacking == 0);
+  });
 }
 
 PlayResult play(const std::filesystem::path& file, const PlaySettings& settings,
                 const std::function<void(std::uint64_t)>& done) {
   RecordingReader reader(file);
   const RecordingHeader& header = reader.header();
-  // For each question the way `refit` comes first.
   std::vector<std::unique_ptr<Contestant>> contestants;
   for (const IterateQuestion question :
-       {IterateQuestion::near, IterateQuestion::swept, IterateQuestion::impact}) {
-    for (const Detection detection : {Detection::refit, Detection::rebuild})
-      contestants.push_back(std::make_unique<Contestant>(header, question, detection, 0, 0));
-    for (const double keep : settings.keep)
-      contestants.push_back(
-          std::make_unique<Contestant>(header, question, Detection::kept, keep, settings.lose_every));
-  }
-  const std::size_t ways = contestants.size() / 3;
+       {IterateQuestion::near, IterateQuestion::swept, IterateQuestion::impact})
+    add_ways(header, question, settings, contestants);
+  const std::size_t questions = settings.strategies.empty() ? 3 : 2, ways = contestants.size() / questions;
   Truth truth(header);
   PairLists truth_begin, truth_end;
   PlayResult result;

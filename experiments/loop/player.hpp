@@ -18,11 +18,21 @@ enum class IterateQuestion : std::uint8_t {
 /// Returns the question in words.
 const char* name(IterateQuestion question);
 
+/// A strategy that a recording is played to.
+struct PlayedStrategy {
+  std::string label;  ///< for tables
+  ContactStrategy strategy;
+  bool exact = true;  ///< promises every pair
+};
+
 struct PlaySettings {
+  /// If any, the questions `swept` and `impact` are asked of these and of the way `refit`, and nothing else:
+  /// strategies know no exact distances.
+  std::vector<PlayedStrategy> strategies{};
   std::vector<double> keep{0.5, 1, 2};  ///< bounds of the ways that keep candidates, in radii
   std::uint64_t truth_every = 100;  ///< iterates that are compared with all pairs, one of so many; 0: none
   std::uint64_t most_iterates = 0;  ///< 0: all
-  std::uint32_t lose_every = 0;     ///< a fault of the ways that keep candidates, for tests
+  std::uint32_t lose_every = 0;     ///< a fault for tests, of the ways that keep candidates and of strategies
 };
 
 /// How one way answered one question over a whole recording.
@@ -38,6 +48,8 @@ struct PlayedWay {
   std::uint64_t lacking = 0;  ///< true pairs that were not listed, over the iterates that were compared
   /// Times of `refit` over times of this way.
   double over_refit = 0;
+  std::string strategy{};  ///< its label; empty: kbvh::broad_phase
+  bool exact = true;       ///< promises every pair
 };
 
 struct PlayResult {
@@ -45,14 +57,14 @@ struct PlayResult {
   std::uint64_t truths = 0;      ///< iterates that were compared with all pairs
   std::uint64_t true_pairs = 0;  ///< within the radius at the begin of these
   std::vector<PlayedWay> ways;
-  /// Returns whether all ways agree and list all true pairs.
+  /// Returns whether all ways that promise every pair agree and list all true pairs.
   bool agree() const;
 };
 
 /// Replays a recording against several ways to detect, in turns within each iterate, in an order that changes
 /// from iterate to iterate. Every way has trees and candidates of its own for each question. Only updates and
 /// answers are timed; comparisons are not. Calls done(iterates) after each iterate. Throws as
-/// RecordingReader.
+/// RecordingReader, and ConfigError as check_contact_strategy.
 PlayResult play(const std::filesystem::path& file, const PlaySettings& settings,
                 const std::function<void(std::uint64_t)>& done = {});
 

@@ -60,8 +60,11 @@ json header_record(const SimulationOptions& options, const Simulated& scene) {
     fixed += mesh.fixed[v];
     driven += mesh.is_driven(v) ? 1 : 0;
   }
+  const Info* const strategy = options.strategy.id.empty() ? nullptr : &info_of(options.strategy.id);
   return {{"schema", "kbvh-loop-1"},
           {"options", identity_of(options)},
+          {"baseline", strategy != nullptr && strategy->baseline},
+          {"exact", strategy == nullptr || strategy->guarantee != Guarantee::approximate},
           {"title", scene_title(options.scene)},
           {"mesh",
            {{"vertices", mesh.vertex_count()},
@@ -222,6 +225,7 @@ std::uint64_t hash_of_state(const State& state) {
 }
 
 SimulationResult simulate(const SimulationOptions& options, const std::function<void(const json&)>& done) {
+  const auto start = std::chrono::steady_clock::now();
   const Simulated scene = make_scene(options.scene, options.triangles, options.seed);
   if (options.save_every == 0) throw std::invalid_argument("a state is saved every 0 steps");
   const ContactMesh contact_mesh(scene.mesh);
@@ -238,7 +242,7 @@ SimulationResult simulate(const SimulationOptions& options, const std::function<
   ImplicitStep step(scene, finder);
   PenetrationCheck check(scene.mesh);
   files.save_frame_of(saved.state);
-  while (saved.state.step < options.steps) {
+  for (bool ends = saved.state.step >= options.steps; !ends;) {
     files.begin_step(saved.state.step);
     const DetectionWork before = finder.work();
     const auto begin = std::chrono::steady_clock::now();
@@ -275,7 +279,9 @@ SimulationResult simulate(const SimulationOptions& options, const std::function<
     record["peak_resident_bytes"] = peak_memory();
     files.write(record);
     files.save_frame_of(saved.state);
-    if (saved.state.step % options.save_every == 0 || saved.state.step == options.steps) files.save(saved);
+    ends = saved.state.step >= options.steps ||
+           (options.most_seconds > 0 && seconds_since(start) >= options.most_seconds);
+    if (ends || saved.state.step % options.save_every == 0) files.save(saved);
     if (done) done(record);
   }
   return result;

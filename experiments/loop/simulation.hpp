@@ -16,6 +16,7 @@ struct SimulationOptions {
   Detection detection = Detection::refit;
   double keep = 0;                 ///< the bound of `kept`, as a multiple of the radius
   std::uint64_t save_every = 10;   ///< steps
+  double most_seconds = 0;         ///< ends after the step in which the call reaches this time; 0: no limit
   ContactStrategy strategy{};      ///< if named, finds the pairs; `detection` is then `refit`, `keep` 0
   std::uint32_t lose_every = 0;    ///< IterateDetector::Settings
   bool record = false;             ///< writes loop.recording
@@ -34,7 +35,7 @@ struct SimulationResult : SavedState {
 std::uint64_t hash_of_state(const State& state);
 
 /// Runs a scene from its start, or from where a run with the same options and folder was saved last, to the
-/// given number of steps. The folder receives
+/// given number of steps, or until `most_seconds` have passed, but for at least one step. The folder receives
 ///   loop.jsonl      a line of JSON for the simulation, then one for each step (experiments/RESULTS.md)
 ///   loop.state      the state after the last saved step, replaced in one move
 ///   loop.recording  with `record`: see recording.hpp

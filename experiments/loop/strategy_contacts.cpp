@@ -7,16 +7,17 @@
 #include "experiments/common/text.hpp"
 
 namespace kbvh::experiments::loop {
-namespace {
 
-const StrategyEntry& entry_of(const std::string& id) {
+const Info& info_of(const std::string& id) {
   std::vector<std::string> known;
   for (const StrategyEntry& entry : registry()) {
-    if (entry.info.id == id) return entry;
+    if (entry.info.id == id) return entry.info;
     known.push_back(entry.info.id);
   }
   throw ConfigError(no_such("strategy", id, known, "`kbvh list` shows them"));
 }
+
+namespace {
 
 /// Returns why a strategy cannot find the pairs of a mesh, as the end of a sentence that begins with its id;
 /// empty if it can.
@@ -48,7 +49,7 @@ void copy_points(const Positions& x, std::vector<double>& points) {
 }  // namespace
 
 void check_contact_strategy(const ContactStrategy& strategy, const ContactMesh& mesh) {
-  const Info& info = entry_of(strategy.id).info;
+  const Info& info = info_of(strategy.id);
   if (const std::string why = why_unsuitable(info, mesh); !why.empty())
     throw ConfigError("'" + info.id + "' " + why);
   const Params checked(info.id, info.parameters, strategy.params);  // throws for an unknown one

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/broad_phase/earliest_impact.hpp"
+#include "core/contract/strategy.hpp"
 #include "core/facade/strategy_broad_phase.hpp"
 #include "experiments/loop/contact_mesh.hpp"
 
@@ -18,6 +19,9 @@ struct ContactStrategy {
   std::string id;                               ///< empty: none, kbvh::broad_phase finds them
   std::map<std::string, std::string> params{};  ///< its parameters, as text
 };
+
+/// Returns what a strategy of the registry says of itself. Throws ConfigError for an unknown id.
+const Info& info_of(const std::string& id);
 
 /// Checks that a strategy can find the pairs of a simulation of this mesh. Throws ConfigError, in one
 /// sentence with the reason, for an unknown id or parameter, and for a strategy that has to know the motion

@@ -20,14 +20,15 @@ from report import loop_part, report
 from results import loop_file
 
 
-def header(scene: str = "sphere", driven: int = 0) -> dict[str, Any]:
+def header(scene: str = "sphere", driven: int = 0, seed: int = 1) -> dict[str, Any]:
     return {
         "schema": loop_file.SCHEMA,
-        "options": {"scene": scene, "triangles": 3, "seed": 1, "detection": "refit"},
+        "options": {"scene": scene, "triangles": 3, "seed": seed, "detection": "refit"},
+        "commit": "0123456789abcdef", "dirty": False, "machine": {"cpu": "a processor"}, "when": "2026-01-31T12:00:00Z",
         "title": "a cloth falls onto a floor",
         "mesh": {"vertices": 10, "faces": 3, "obstacle_faces": 1, "driven_vertices": driven},
         "physics": {"time_step_s": 0.01},
-    }
+    }  # fmt: skip
 
 
 def step(number: int, penetrations: int = 0) -> dict[str, Any]:
@@ -35,7 +36,7 @@ def step(number: int, penetrations: int = 0) -> dict[str, Any]:
         "step": number, "time_s": 0.01 * number, "iterates": 4, "contacts": 10 * number, "smallest_gap_m": 1e-3 / number,
         "penetrations": penetrations, "detect_ms": 1.0, "impact_ms": 0.5, "rest_ms": 2.0 + number, "kinetic_j": 1.0,
         "gravitational_j": -float(number), "elastic_j": 0.5, "barrier_j": 0.25, "memory_bytes": 1e6,
-        "resident_bytes": 2e7 + number, "momentum_kg_m_s": [1.0, 2.0, -3.0],
+        "resident_bytes": 2e7 + number, "momentum_kg_m_s": [1.0, 2.0, -3.0], "state": f"{number:016x}",
     }  # fmt: skip
 
 
@@ -73,7 +74,12 @@ class TestReading(LoopCase):
         head["options"] |= {"strategy": None}
         self.assertEqual(loop_file.load(self.write("b", [step(1)], head=head)).detection, "refit")
         head["options"] |= {"detection": "strategy", "strategy": "leaf_slabs", "params": {}}
-        self.assertEqual(loop_file.load(self.write("c", [step(1)], head=head)).detection, "leaf_slabs")
+        one = loop_file.load(self.write("c", [step(1)], head=head))
+        self.assertEqual((one.detection, one.finder, one.baseline, one.exact), ("leaf_slabs", "leaf_slabs", False, True))
+        head["options"] |= {"params": {"leaf": "4", "width": "8"}}
+        head |= {"baseline": True, "exact": False}
+        one = loop_file.load(self.write("d", [step(1)], head=head))
+        self.assertEqual((one.finder, one.baseline, one.exact), ("leaf_slabs [leaf=4, width=8]", True, False))
 
     def test_a_line_that_breaks_off_is_left_out(self) -> None:
         one = loop_file.load(self.write("a", [step(1)], tail='{"step": 2, "time'))
@@ -97,11 +103,12 @@ class TestReading(LoopCase):
             with self.assertRaisesRegex(loop_file.LoopError, word):
                 loop_file.load(folder)
 
-    def test_simulations_are_found_here_and_in_loop(self) -> None:
-        for place in ("", "sheets", "loop/sphere"):
+    def test_simulations_are_found_wherever_they_lie(self) -> None:
+        for place in ("", "sheets", "loop/sphere", "live/small/sphere/bottom_up"):
             self.write(place, [step(1)])
+        (self.folder / "other" / "loop.jsonl").mkdir(parents=True)
         found = [str(place.relative_to(self.folder)) for place in loop_file.find(self.folder)]
-        self.assertEqual(found, [".", "sheets", "loop/sphere"])
+        self.assertEqual(found, [".", "live/small/sphere/bottom_up", "loop/sphere", "sheets"])
 
 
 class TestFigures(LoopCase):
@@ -226,6 +233,15 @@ class TestReport(LoopCase):
         self.assertIn("<td>sphere</td>", page)
         self.assertNotIn("<summary>sphere", page)
 
+    def test_of_one_motion_one_simulation_is_drawn(self) -> None:
+        self.write("live/broad_phase", [step(1)], frames=0)
+        self.write("live/lbvh", [step(1)])
+        self.write("live/other", [step(1)], head=header(seed=2), frames=0)
+        part = loop_part.loop_part(self.folder, "paper", [])
+        assert part is not None
+        self.assertEqual(len(part.rows), 3)
+        self.assertEqual([one.film is not None for one in part.pictures], [True, False])
+
     def test_what_cannot_be_read_is_a_note(self) -> None:
         self.write("loop/sphere", [step(1)], head={"schema": "other"})
         page, err = self.page()
@@ -234,7 +250,7 @@ class TestReport(LoopCase):
 
     def test_pictures_of_many_simulations_lie_next_to_the_page(self) -> None:
         for number in range(loop_part.MOST_EMBEDDED + 1):
-            self.write(f"loop/{number}", [step(1)], frames=0)
+            self.write(f"loop/{number}", [step(1)], head=header(seed=number), frames=0)
         part = loop_part.loop_part(self.folder, "paper", [])
         assert part is not None
         uris = [one.steps.uri for one in part.pictures if one.steps]

@@ -5,11 +5,20 @@
 
 #include "binary.hpp"
 #include "experiments/cli/loop_runs.hpp"
+#include "experiments/results/table.hpp"
 
 namespace kbvh::experiments::loop_command_test {
 namespace {
 
 const std::string cloth = "loop --scene sphere --triangles 100 ";
+
+std::size_t longest_line_of(const std::string& out) {
+  std::size_t longest = 0, begin = 0;
+  for (std::size_t end = out.find('\n'); end != std::string::npos;
+       begin = end + 1, end = out.find('\n', begin))
+    longest = std::max(longest, end - begin);
+  return longest;
+}
 
 TEST_F(Binary, LoopRunsRecordsAndReplays) {
   const Outcome run = kbvh(cloth + "--steps 12 --record --frames 6 --out out");
@@ -36,6 +45,19 @@ TEST_F(Binary, LoopRunsRecordsAndReplays) {
   for (const char* word : {"near", "swept", "impact", "rebuild", "kept, 0.5 radii"})
     EXPECT_NE(play.out.find(word), std::string::npos) << word << "\n" << play.out;
 
+  // Played to strategies, which know no exact distances.
+  const std::string to_strategies = "loop --play out/loop.recording --strategies broad_phase,bottom_up,lbvh";
+  const Outcome answered = kbvh(to_strategies);
+  EXPECT_EQ(answered.code, 0) << answered.err;
+  for (const char* word : {"swept", "impact", "refit", "bottom_up", "lbvh"})
+    EXPECT_NE(answered.out.find(word), std::string::npos) << word << "\n" << answered.out;
+  EXPECT_EQ(answered.out.find("near"), std::string::npos) << answered.out;
+  EXPECT_EQ(kbvh(to_strategies + " --lose 1").code, 1);
+  const Outcome unsuitable = kbvh("loop --play out/loop.recording --strategies kinetic_aabb");
+  EXPECT_EQ(unsuitable.code, 2) << unsuitable.err;
+  EXPECT_NE(unsuitable.err.find("--clip writes the iterates for `kbvh run`"), std::string::npos)
+      << unsuitable.err;
+
   const Outcome clip = kbvh("loop --play out/loop.recording --clip iterates --iterates 9");
   EXPECT_EQ(clip.code, 0) << clip.err;
   EXPECT_NE(clip.out.find("9 iterates"), std::string::npos) << clip.out;
@@ -47,13 +69,8 @@ TEST_F(Binary, LoopRunsRecordsAndReplays) {
   ASSERT_EQ(contestants.size(), 2u);
   EXPECT_EQ(contestants[0].at("scene").at("frames"), 9);
 
-  for (const std::string& out : {run.out, play.out, clip.out}) {
-    std::size_t longest = 0, begin = 0;
-    for (std::size_t end = out.find('\n'); end != std::string::npos;
-         begin = end + 1, end = out.find('\n', begin))
-      longest = std::max(longest, end - begin);
-    EXPECT_LE(longest, 110u) << out;
-  }
+  for (const std::string& out : {run.out, play.out, answered.out, clip.out})
+    EXPECT_LE(longest_line_of(out), 110u) << out;
 }
 
 TEST_F(Binary, LoopComparesStrategies) {
@@ -62,6 +79,7 @@ TEST_F(Binary, LoopComparesStrategies) {
   for (const char* word : {"of sphere", "over refit", "states", "broad_phase", "bottom_up", "lbvh", "equal"})
     EXPECT_NE(run.out.find(word), std::string::npos) << word << "\n" << run.out;
   EXPECT_EQ(run.out.find("differ at"), std::string::npos) << run.out;
+  EXPECT_LE(longest_line_of(run.out), longest_line) << run.out;
   const std::vector<json> own = records("out/broad_phase/loop.jsonl");
   ASSERT_EQ(own.size(), 21u);
   EXPECT_TRUE(own[0].at("options").at("strategy").is_null());
@@ -70,6 +88,8 @@ TEST_F(Binary, LoopComparesStrategies) {
     const std::vector<json> found = records("out/" + strategy + "/loop.jsonl");
     ASSERT_EQ(found.size(), 21u);
     EXPECT_EQ(found[0].at("options").at("strategy"), strategy);
+    EXPECT_EQ(found[0].at("baseline"), strategy == "bottom_up");
+    EXPECT_EQ(found[0].at("exact"), true);
     for (std::size_t i = 1; i < found.size(); ++i)
       for (const char* key : {"state", "candidates", "questions", "penetrations"})
         EXPECT_EQ(found[i].at(key), own[i].at(key)) << strategy << i << key;
@@ -127,6 +147,43 @@ TEST_F(Binary, LoopRunsTheSimulationsOfAPlan) {
     EXPECT_NE(outcome.err.find(part), std::string::npos) << plan << "\n" << outcome.err;
     EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
   }
+}
+
+TEST_F(Binary, LoopRunsAPlanInParts) {
+  write_text(folder_ / "plan.json", R"({"name": "p", "scenes": "turning_box", "live": [
+    {"name": "both", "scene": ["sphere", "cloths", "sphere"], "triangles": 60, "steps": 4,
+     "strategies": ["broad_phase", "bottom_up"]},
+    {"scene": "sheets", "triangles": 60, "steps": 2}]})");
+  const auto lines = [&](const std::string& out, const std::string& folder) {
+    return records(out + "/" + folder + "/loop.jsonl");
+  };
+  const std::string folders[] = {"both/sphere/broad_phase", "both/sphere/bottom_up",
+                                 "both/cloths/broad_phase", "both/cloths/bottom_up"};
+  // In no time, each makes a step; later the same command makes the others.
+  const std::string both = "loop --plan plan.json --study both --out live";
+  ASSERT_EQ(kbvh(both + " --seconds 0.001").code, 0);
+  for (const std::string& folder : folders) EXPECT_GE(lines("live", folder).size(), 2u) << folder;
+  const Outcome run = kbvh(both);
+  EXPECT_EQ(run.code, 0) << run.err;
+  EXPECT_NE(run.err.find("continued after step"), std::string::npos) << run.err;
+  for (const char* word : {"of both, sphere", "of both, cloths", "first 4 steps", "of all", "equal"})
+    EXPECT_NE(run.out.find(word), std::string::npos) << word << "\n" << run.out;
+  for (const std::string& folder : folders) {
+    const std::vector<json> found = lines("live", folder);
+    ASSERT_EQ(found.size(), 5u) << folder;
+    for (std::size_t i = 1; i < found.size(); ++i) EXPECT_EQ(found[i].at("step"), i) << folder;
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "live" / "sheets"));
+  // The sums are those of all steps, also where no step was left to make.
+  const Outcome again = kbvh(both);
+  EXPECT_EQ(again.out, run.out);
+
+  ASSERT_EQ(kbvh("loop --plan plan.json --steps 1 --out short").code, 0);
+  EXPECT_EQ(lines("short", "sheets").size(), 2u);
+  EXPECT_EQ(lines("short", folders[3]).size(), 2u);
+  const Outcome unknown = kbvh("loop --plan plan.json --study bot");
+  EXPECT_EQ(unknown.code, 2);
+  EXPECT_NE(unknown.err.find("did you mean 'both'?"), std::string::npos) << unknown.err;
 }
 
 TEST(LoopPlan, HasSimulationsOfEveryScene) {
@@ -188,6 +245,11 @@ TEST_F(Binary, LoopRefusesInOneSentence) {
       {"loop --param threads=2", "goes with --strategies"},
       {"loop --param threads", "expected key=value"},
       {"loop --plan nothing.json", "nothing.json"},
+      {"loop --plan x --strategies bottom_up", "--strategies"},
+      {"loop --study x", "--plan"},
+      {"loop --play x --seconds 3", "--seconds"},
+      {"loop --play x --clip y --strategies bottom_up", "--strategies"},
+      {"loop --play x --strategies bottom_up", "--play"},
       {"loop --plan x --scene sphere", "--plan"}};
   for (const auto& [arguments, part] : cases) {
     const Outcome outcome = kbvh(arguments);

@@ -106,6 +106,8 @@ const std::map<std::string, std::vector<Option>> all_options{
       {"--plan", Kind::names, "plan.json"},
       {"--keep", Kind::number, "1"},
       {"--save-every", Kind::number, "1"},
+      {"--seconds", Kind::number, "1"},
+      {"--study", Kind::several, "small"},
       {"--lose", Kind::number, "1"},
       {"--frames", Kind::number, "1"},
       {"--play", Kind::names, "loop.recording"},

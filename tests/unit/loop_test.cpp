@@ -133,6 +133,24 @@ TEST(Simulation, GoesOnWithTheSameBitsAfterItWasKilled) {
   EXPECT_THROW(simulate(options), io::InputError);
 }
 
+/// A time that is over at once lets each call make one step.
+TEST(Simulation, GoesOnWhereItsTimeEnded) {
+  const TemporaryFolder folder;
+  SimulationOptions options = small("cloths", 5);
+  const std::uint64_t expected = hash_of_state(simulate(options).state);
+  options.folder = folder / "out";
+  options.most_seconds = 1e-9;
+  for (std::uint64_t step = 0; step < 5; ++step) {
+    const SimulationResult made = simulate(options);
+    EXPECT_EQ(made.first_step, step);
+    EXPECT_EQ(made.state.step, step + 1);
+  }
+  const SimulationResult whole = simulate(options);
+  EXPECT_EQ(whole.first_step, 5u);
+  EXPECT_EQ(hash_of_state(whole.state), expected);
+  EXPECT_EQ(lines_of(options.folder / "loop.jsonl").size(), 6u);
+}
+
 /// A sheet in flight, with random velocities.
 Simulated flying_sheet(const Eigen::Vector3d& gravity) {
   MeshBuilder builder;
@@ -342,6 +360,39 @@ TEST_F(Recorded, AWayThatLosesPairsIsFound) {
     EXPECT_EQ(way.differences > 0, way.detection == Detection::kept);
     EXPECT_EQ(way.lacking > 0, way.detection == Detection::kept);
   }
+}
+
+TEST_F(Recorded, StrategiesAnswerLikeTheBroadPhase) {
+  PlaySettings settings;
+  settings.truth_every = 20;
+  settings.strategies = {{"bottom_up", {"bottom_up"}}, {"lbvh", {"lbvh"}}};
+  const PlayResult result = play(file_, settings);
+  EXPECT_GT(result.true_pairs, 0u);
+  ASSERT_EQ(result.ways.size(), 6u);
+  for (std::size_t i = 0; i < 6; ++i) {
+    const PlayedWay& way = result.ways[i];
+    EXPECT_EQ(way.question, i < 3 ? IterateQuestion::swept : IterateQuestion::impact);
+    EXPECT_EQ(way.strategy, i % 3 == 0 ? "" : settings.strategies[i % 3 - 1].label);
+    EXPECT_EQ(way.differences, 0u) << way.strategy;
+    EXPECT_EQ(way.lacking, 0u) << way.strategy;
+    EXPECT_EQ(way.listed, result.ways[0].listed) << way.strategy;
+    if (i % 3 > 0) {
+      EXPECT_EQ(way.searches, 2 * result.iterates) << way.strategy;
+    }
+  }
+  EXPECT_TRUE(result.agree());
+
+  settings.lose_every = 5;
+  settings.truth_every = 1;
+  PlayResult lossy = play(file_, settings);
+  EXPECT_FALSE(lossy.agree());
+  for (const PlayedWay& way : lossy.ways) {
+    if (way.question == IterateQuestion::impact) continue;
+    EXPECT_EQ(way.differences > 0, !way.strategy.empty());
+    EXPECT_EQ(way.lacking > 0, !way.strategy.empty());
+  }
+  for (PlayedWay& way : lossy.ways) way.exact = way.strategy.empty();
+  EXPECT_TRUE(lossy.agree());
 }
 
 TEST_F(Recorded, DamageIsRefused) {
