@@ -311,7 +311,7 @@ def _on_positions_only(found: Sequence[Situation], reference: Path) -> list[str]
     known = [one for one in advice.situations([cell for cell in kept.cells if cell.asks == advice.SELF])] if kept else []
     if kept and known:
         nearest = next((one for one in known if one.frames == only), known[0])
-        titles = text.listing([cell.title for cell in kept.cells if (cell.asks, cell.frames) == (nearest.asks, nearest.frames)])
+        titles = text.listing([cell.title for cell in advice.counted(kept.cells) if (cell.asks, cell.frames) == (nearest.asks, nearest.frames)])
         says += f" Nearest, by measurements that come with the project ({kept.short}; {titles}): {advice.brief(nearest)}."
     return [says]
 

@@ -212,6 +212,15 @@ class TestSentences(unittest.TestCase):
         self.assertTrue(keyframe.ratio.startswith("1.50"), keyframe.ratio)
         assert cloth.advised[1] is not None
         self.assertTrue(cloth.advised[1].ratio.startswith("2.00?"), "doubtful")
+        self.assertTrue(ball.counts and cloth.counts)
+
+    def test_a_cell_that_two_plans_measured_has_two_lines_of_which_one_counts(self) -> None:
+        more = cells_file.of_study(self.study([line("refit", 3.0), other("join", 1.0), other("tree", 2.0)]))
+        few = cells_file.of_study(self.study([line("refit", 2.0), other("join", 1.0)]))
+        with tempfile.TemporaryDirectory(prefix="kbvh-analysis-") as name:
+            (Path(name) / "cells.json").write_text(cells_file.content(cells_file.Cells([*more.measured, *few.measured], [*more.cells, *few.cells])), encoding="utf-8")
+            found = kept_costs.kept_lines(Path(name))
+        self.assertEqual([(one.refit.ms, one.counts) for one in found], [("3.00", True), ("2.00", False)])
 
     def test_self_collision_with_positions_only_is_said_to_be_unmeasured(self) -> None:
         found = advice.situations(self.within())
