@@ -6,6 +6,7 @@ import contextlib
 import io
 import itertools
 import json
+import re
 import shutil
 import subprocess
 import unittest
@@ -226,6 +227,25 @@ class TestProgram(Folder):
                         self.assertAlmostEqual(one / other, 1, delta=2e-3)
                     self.assertEqual(got[3], len(wanted) > 1 and wanted[3])
 
+
+    def test_the_recommended_line_is_the_brightest_on_the_dark_page(self) -> None:
+        synthetic.write(self.folder, [synthetic.record(one, "s", 2000, "float", 10) for one in synthetic.CONTESTANTS])
+        found = self.answer("""
+            import { model } from "SRC/model.js";
+            import { leading } from "SRC/looks.js";
+            const all = model(data).contestants;
+            const lists = all.map((one) => leading([one, ...all.filter((other) => other !== one)]));
+            console.log(JSON.stringify(lists.map((list) => list.map((one) => [one.look.dark, one.paint ?? ""]))));""")
+        self.assertEqual(len(found), len({json.dumps(one) for one in found}))
+        brightened = 0
+        for (own, paint), *others in found:
+            share = re.search(r" (\d+)%", paint)
+            shown = colours.mix(own, 1 - int(share[1]) / 100) if share else own
+            brightened += share is not None
+            self.assertEqual({paint for _, paint in others}, {""})
+            for other, _ in others:
+                self.assertGreaterEqual(colours.contrast(shown, "#000000"), colours.contrast(other, "#000000"), f"{own} among others")
+        self.assertEqual(brightened, len(found) - sum(own == max((one[0][0] for one in found), key=lambda one: colours.contrast(one, "#000000")) for (own, _), *_ in found))
 
     def test_cells_count_as_in_the_report(self) -> None:
         # One scene in clips of two lengths, by two plans: the measurement with more strategies counts, of equal ones the newest. A strategy

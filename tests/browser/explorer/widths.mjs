@@ -62,6 +62,35 @@ await check("the switch changes the scheme", async () => {
   await page.close();
 });
 
+await check("in the dark scheme the recommended line is at least as bright as the others", async () => {
+  for (const link of ["answer&know=none", "answer&know=next", "answer&know=clip", "scaling"]) {
+    const page = await open("reference", `#view=${link}`, { width: 1440, scheme: "dark" });
+    const charts = await page.$$eval("#view svg.chart", (list) => {
+      const brush = document.createElement("canvas").getContext("2d", { willReadFrequently: true });
+      const luminance = (colour) => {
+        brush.fillStyle = colour;
+        brush.fillRect(0, 0, 1, 1);
+        const [r, g, b] = [...brush.getImageData(0, 0, 1, 1).data].map((c) => (c / 255 <= 0.03928 ? c / 255 / 12.92 : ((c / 255 + 0.055) / 1.055) ** 2.4));
+        return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+      };
+      return list.map((chart) =>
+        [...chart.querySelectorAll('g[aria-label="line"]')].map((line) => {
+          const { stroke, strokeWidth } = getComputedStyle(line);
+          return [parseFloat(strokeWidth), luminance(stroke)];
+        }),
+      );
+    });
+    const shown = charts.filter((lines) => lines.some(([width]) => width === 3));
+    assert.ok(shown.length > 0, link);
+    for (const lines of shown) {
+      const others = lines.filter(([width]) => width === 1.5).map(([, bright]) => bright);
+      const [, own] = lines.find(([width]) => width === 3);
+      assert.ok(others.length > 0 && own >= Math.max(...others) - 0.01, `${link}: ${own} and ${others}`);
+    }
+    leave(page);
+  }
+});
+
 // --- the report -------------------------------------------------------------------------------------------------
 
 /** Returns what reaches beyond the window without being in a part that scrolls. */
