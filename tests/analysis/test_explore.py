@@ -236,7 +236,7 @@ class TestProgram(Folder):
             const all = model(data).contestants;
             const lists = all.map((one) => leading([one, ...all.filter((other) => other !== one)]));
             console.log(JSON.stringify(lists.map((list) => list.map((one) => [one.look.dark, one.paint ?? ""]))));""")
-        self.assertEqual(len(found), len({json.dumps(one) for one in found}))
+        self.assertGreater(len(found), 10)
         brightened = 0
         for (own, paint), *others in found:
             share = re.search(r" (\d+)%", paint)
@@ -245,7 +245,8 @@ class TestProgram(Folder):
             self.assertEqual({paint for _, paint in others}, {""})
             for other, _ in others:
                 self.assertGreaterEqual(colours.contrast(shown, "#000000"), colours.contrast(other, "#000000"), f"{own} among others")
-        self.assertEqual(brightened, len(found) - sum(own == max((one[0][0] for one in found), key=lambda one: colours.contrast(one, "#000000")) for (own, _), *_ in found))
+        brightest = max((one[0][0] for one in found), key=lambda one: colours.contrast(one, "#000000"))
+        self.assertEqual(brightened, sum(one[0][0] != brightest for one in found), "the brightest one keeps its colour")
 
     def test_cells_count_as_in_the_report(self) -> None:
         # One scene in clips of two lengths, by two plans: the measurement with more strategies counts, of equal ones the newest. A strategy
