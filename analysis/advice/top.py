@@ -21,7 +21,7 @@ from results.load import Study
 #: The questions that the top answers, as its sentences and its chart call them.
 ASKED = {advice.PAIRS: "Two bodies", advice.SELF: "Within a body", advice.RAYS: "Rays"}
 POSITIONS_ONLY = "positions only"
-KEPT = "By the project's measurements"
+KEPT = "By the project's own runs"
 
 
 @dataclass(frozen=True)

@@ -224,12 +224,14 @@ def sentences(study: Study, place: Place) -> list[str]:
 
 #: What makes a sentence's number doubtful.
 NOT_APART, DISTURBED = "this run does not tell them apart", "a doubtful run: the machine was disturbed"
+#: The same in short.
+DOUBTS = {NOT_APART: "not told apart", DISTURBED: "a doubtful run"}
 
 
 def brief(place: Place) -> str:
-    """Returns what errors buy in one short sentence: if nothing of the future is known, or else whatever is known."""
+    """Returns what errors buy in one short sentence: if nothing of the future is known or, without exact contestants of that kind, whatever is known."""
     usable = [one for one in place.points if one.foresight == "none"] if place.unknowing else place.points
-    known = "" if not place.unknowing else " if nothing of the future is known"
+    known = "" if not place.unknowing else " if nothing is known"
     exact = next((one for one in usable if one.exact), None)
     few = next((one for one in usable if not one.exact and one.missed < FEW), None)
     allowed = f"{FEW:.0%}".replace("%", "\u00a0%")
@@ -238,8 +240,7 @@ def brief(place: Place) -> str:
         return f"No exact contestant was measured where one answers wrongly ({where})."
     if few is None:
         return f"No approximate contestant missed less than {allowed} of the pairs{known}; the exact {exact.title} takes {text.milliseconds(exact.time)} ms ({where})."
-    doubts = [doubt for doubt in (NOT_APART, DISTURBED) if place.sentences and doubt in place.sentences[0]]
-    doubt = f", {doubts[0].split(':')[0]}" if doubts else ""
+    doubt = next((f", {brief}" for whole, brief in DOUBTS.items() if place.sentences and whole in place.sentences[0]), "")
     times = text.factor(max(exact.time, few.time) / min(exact.time, few.time))
     buys = f"makes a frame {times} times as fast{known}" if few.time < exact.time else f"gains nothing{known}"
     return (

@@ -68,7 +68,7 @@ class TestTaking(unittest.TestCase):
             self.assertEqual(top.on_others([], folder), "Not measured: within a body and rays.")
             (folder / "cells.json").write_text(cells_file.content(cells_file.of_study(study(rays))), encoding="utf-8")
             told = "Rays, 10 frames a keyframe and more: refit; if the next keyframe is known, join (2.00 times as fast, not beyond doubt)."
-            self.assertEqual(top.on_others([], folder), f"By the project's measurements: {told} Not measured: within a body.")
+            self.assertEqual(top.on_others([], folder), f"By the project's own runs: {told} Not measured: within a body.")
             own = situation(FRAMES[0], best("refit", 1.0), asks=advice.RAYS)
             self.assertEqual(top.on_others([own], folder), "Rays, positions only: refit. Not measured: within a body.", "this study comes first")
 

@@ -127,7 +127,7 @@ for (const which of ["reference", "merged", "erring"])
       const tall = await page.evaluate(() => document.documentElement.scrollHeight);
       // Of a desktop, and of a phone of 390 x 844.
       if (width !== 800) assert.ok(tall <= (width === 1280 ? 2 * 900 : 3 * 844), `${tall} pixels`);
-      const rows = await page.$$eval(".sentences li > span", (list) => list.map((one) => Math.round(one.offsetHeight / parseFloat(getComputedStyle(one).lineHeight))));
+      const rows = await page.$$eval(".sentences li", (list) => list.map((one) => Math.round(one.offsetHeight / parseFloat(getComputedStyle(one).lineHeight))));
       assert.equal(rows.length, 5);
       if (width === 1280) assert.ok(Math.max(...rows) <= 2, `sentences of ${rows} lines`);
       if (width === 1280) assert.ok((await page.$eval("#answers", (one) => one.getBoundingClientRect().bottom)) <= 900, "the answers are on the first screen");
