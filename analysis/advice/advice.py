@@ -422,7 +422,7 @@ def records(every: Sequence[Cell]) -> dict[str, Record]:
     """Returns the record of every strategy with a time in some cell."""
     result: dict[str, Record] = {}
     shares: dict[str, list[float]] = {}
-    for cell in every:
+    for cell in counted(every):
         for id in cell.speeds:
             share = cell.share(id)
             record = result.setdefault(id, Record())
