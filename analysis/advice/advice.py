@@ -5,7 +5,8 @@ part, each with its fastest setting of the cell; a cell without a refit, or with
 in a cell is the time of the best refit over its own, of whole clips, positions included. A situation is the knowledge of the future, the
 frames from one keyframe to the next, and the question asked. **The rule:** of the strategies that need to know no more than is known, and
 were measured in at least half of the situation's cells, take the one with the largest geometric mean of its speeds; a cell in which it
-was not measured counts as its slowest. The explorer uses the same rule (explorer/src/advice.js), and a test compares the two.
+was not measured counts as its slowest. A cell that several plans measured counts once (`counted`). The explorer uses the same rule
+(explorer/src/advice.js), and a test compares the two.
 
 The same cells are kept with the project (`cells_file`): the guide's table comes from them, and a report names them for questions that
 its own study did not ask.
@@ -107,6 +108,16 @@ class Cell:
     facts: dict[str, Facts]
     span: Callable[[str], Optional[Span]]  #: of a strategy's ratio
 
+    @property
+    def identity(self) -> tuple[Any, ...]:
+        """Returns what two measurements of one cell have in common: its title names scene, size, scalar and l."""
+        return self.title, self.asks, self.primitives
+
+    @property
+    def last(self) -> int:
+        """Returns the place of its newest result in the file of results; 0 if it is not known."""
+        return 0
+
     def share(self, id: str) -> float:
         """Returns the time of the fastest over that of a strategy."""
         return self.speeds[id] / max(self.speeds.values())
@@ -125,6 +136,14 @@ class MeasuredCell(Cell):
     runs: dict[str, int]  #: by strategy: its fastest setting
     contestants: dict[str, str]
     row: pd.Series  #: of the best refit
+
+    @property
+    def identity(self) -> tuple[Any, ...]:
+        return self.title, self.asks, self.primitives, self.row["machine"]
+
+    @property
+    def last(self) -> int:
+        return max(self.runs.values())
 
 
 @dataclass
@@ -300,8 +319,21 @@ def _speed(study: Study, run: int, refit: int) -> float:
     return top / bottom if bottom > 0 else math.nan
 
 
+def counted(every: Sequence[Cell]) -> list[Cell]:
+    """Returns every cell once: of a cell that several plans measured, for example in clips of different lengths, the measurement with the most
+    strategies; of equal ones the newest.
+    """
+    chosen: dict[tuple[Any, ...], Cell] = {}
+    for cell in every:
+        known = chosen.get(cell.identity)
+        if known is None or (len(cell.speeds), cell.last) >= (len(known.speeds), known.last):
+            chosen[cell.identity] = cell
+    return list(chosen.values())
+
+
 def situations(every: Sequence[Cell]) -> list[Situation]:
     """Returns the advice for each situation that there are cells of: pairs of two bodies first."""
+    every = counted(every)
     kinds = list(dict.fromkeys([PAIRS, SELF, *(cell.asks for cell in every)]))
     found = []
     for asks in kinds:
@@ -390,7 +422,7 @@ def records(every: Sequence[Cell]) -> dict[str, Record]:
     """Returns the record of every strategy with a time in some cell."""
     result: dict[str, Record] = {}
     shares: dict[str, list[float]] = {}
-    for cell in every:
+    for cell in counted(every):
         for id in cell.speeds:
             share = cell.share(id)
             record = result.setdefault(id, Record())

@@ -29,6 +29,7 @@ class KeptLine:
     l: str
     refit: Cost
     advised: list[Optional[Cost]]  #: by what is known, in the order of FORESIGHT; None where less knowledge, or the refit, does as well
+    counts: bool = True  #: False: another plan measured the same cell, and its measurement counts
 
 
 def kept_lines(reference: Path = summary.REFERENCE) -> list[KeptLine]:
@@ -40,18 +41,21 @@ def kept_lines(reference: Path = summary.REFERENCE) -> list[KeptLine]:
     for asks in dict.fromkeys(cell.asks for cell in kept.cells):
         for name in advice.SIZES:
             own = summary.own_cells(kept, name, asks)
+            once = advice.counted(own)
             for one in advice.situations(own):
                 taken = {known: best.id for known, best in advice.changes(one)}
-                found += [(cell.primitives, _line(cell, taken)) for cell in own if cell.frames == one.frames]
+                found += [
+                    (cell.primitives, _line(cell, taken, any(cell is other for other in once))) for cell in own if cell.frames == one.frames
+                ]
     return [line for _, line in sorted(found, key=lambda one: (one[1].asks, one[0], one[1].l))]
 
 
-def _line(cell: advice.Cell, taken: dict[str, str]) -> KeptLine:
+def _line(cell: advice.Cell, taken: dict[str, str], counts: bool) -> KeptLine:
     """Returns the line of a cell; `taken` is what the rule takes in its situation, by what is known."""
     scene, _, rest = cell.title.partition(", ")
     advised = [_cost(cell, taken[known]) if taken.get(known, cell.best_refit) in cell.times.keys() - {cell.best_refit} else None for known in advice.FORESIGHT]
     asks = "" if cell.asks == advice.PAIRS else cell.asks
-    return KeptLine(scene, asks, text.size(cell.primitives), rest.rpartition("l = ")[2], _cost(cell, cell.best_refit), advised)
+    return KeptLine(scene, asks, text.size(cell.primitives), rest.rpartition("l = ")[2], _cost(cell, cell.best_refit), advised, counts)
 
 
 def _cost(cell: advice.Cell, id: str) -> Cost:

@@ -1,4 +1,5 @@
-"""The top of the report: five sentences and one small chart, computed; the command prints the same sentences."""
+"""The answers of a report in full, computed: what to take, what errors buy, what holds of the paper, how disturbed the run was; its chart, and the
+table of scenes. `top` says the same in five short sentences."""
 
 from __future__ import annotations
 
@@ -180,39 +181,37 @@ def parts_on_the_paper(found: Paper) -> list[str]:
     return ([on_the_main_claim(main)] if main is not None else []) + [says]
 
 
-def on_disturbance(study: Study) -> str:
-    """Says how disturbed the run was, as far as the records know."""
+def on_disturbance(study: Study) -> list[str]:
+    """Says how disturbed the run was, as far as the records know; in a second sentence what is doubtful, for example."""
     timed = study.timed
     old = int((timed["schema"] == OLD_SCHEMA).sum())
     if old == len(timed):
-        return "How disturbed the run was is unknown: its records are older than that field, and leave out the beginning of each clip."
+        return ["How disturbed the run was is unknown: its records are older than that field, and leave out the beginning of each clip."]
     rest = timed[timed["schema"] != OLD_SCHEMA]
     doubtful = rest[rest["disturbed"] != ""]
     of = f"{text.count(len(rest))} timed contestants"
     if doubtful.empty:
-        return f"The machine was quiet: none of {of} waited for a processor or slowed down."
+        return [f"The machine was quiet: none of {of} waited for a processor or slowed down."]
     example = doubtful.iloc[0]
     share = len(doubtful) / len(rest)
-    return (
-        f"The machine was {'often ' if share > 0.1 else ''}disturbed: {len(doubtful)} of {of} are doubtful and have a question mark, for example "
-        f"{example['title']} on {short(example['scene'])} ({example['disturbed']})."
-    )
+    return [
+        f"The machine was {'often ' if share > 0.1 else ''}disturbed: {len(doubtful)} of {of} are doubtful and have a question mark.",
+        f"For example {example['title']} on {short(example['scene'])}: {example['disturbed']}.",
+    ]
 
 
 @dataclass(frozen=True)
 class Sentence:
-    """One line of the top: its subject, its sentences, each a line of the page, and the id of the part with the details."""
+    """One answer: its subject, its sentences, each a paragraph of the page, and the id of the part with the details."""
 
     subject: str
     parts: list[str]
     place: str
     more: Optional[tuple[str, str]] = None  #: id and title of a part with more, which the page links after the sentences
-    first: int = 1  #: so many of the sentences answer the question; a phone folds the rest
-    rest: str = "More"  #: what the rest is about
 
     @property
     def says(self) -> str:
-        """Returns the sentences as one text, for the terminal."""
+        """Returns the sentences as one text."""
         return " ".join(self.parts)
 
 
@@ -311,7 +310,7 @@ def _on_positions_only(found: Sequence[Situation], reference: Path) -> list[str]
     known = [one for one in advice.situations([cell for cell in kept.cells if cell.asks == advice.SELF])] if kept else []
     if kept and known:
         nearest = next((one for one in known if one.frames == only), known[0])
-        titles = text.listing([cell.title for cell in kept.cells if (cell.asks, cell.frames) == (nearest.asks, nearest.frames)])
+        titles = text.listing([cell.title for cell in advice.counted(kept.cells) if (cell.asks, cell.frames) == (nearest.asks, nearest.frames)])
         says += f" Nearest, by measurements that come with the project ({kept.short}; {titles}): {advice.brief(nearest)}."
     return [says]
 
@@ -327,7 +326,7 @@ def on_errors(errors: Sequence[time_error_panels.Shown], reference: Path = REFER
 
 
 def sentences(study: Study, found: Sequence[Situation], errors: Sequence[time_error_panels.Shown], known: Paper) -> list[Sentence]:
-    """Returns the five lines of the top; four in a study of other questions than pairs of two bodies."""
+    """Returns the five answers; four in a study of other questions than pairs of two bodies."""
     pairs = [one for one in found if one.asks == advice.PAIRS]
     said: list[Sentence] = []
     told: list[tuple[str, str]] = []
@@ -336,17 +335,15 @@ def sentences(study: Study, found: Sequence[Situation], errors: Sequence[time_er
         told = [one for situation in [*ends, *larger(found)] for one in advice.recommended(situation)]
         parts = [*(advice.sentence(one) for one in ends), *on_larger(found), methods.explained(told)]
         kept = ("kept", "The project's measurements, scene by scene")
-        rest = "Larger scenes, and what these strategies do"
-        said.append(Sentence("What to take", [part for part in parts if part], "glance", kept, len(ends), rest))
+        said.append(Sentence("What to take", [part for part in parts if part], "glance", kept))
     place = next((anchor for asks, anchor in advice.ANCHORS.items() if any(one.asks == asks for one in found)), "kept" if kept_cells() else "limits")
     new = [one for situation in found if situation.asks in advice.ANCHORS for one in advice.recommended(situation) if one not in told]
     others = [part for part in [*parts_on_others(found), methods.explained(new)] if part]
-    answers = min(2, len({one.asks for one in found if one.asks != advice.PAIRS}))  # as many as parts_on_others begins with
-    said.append(Sentence("Self-collision, rays", others, place, first=max(1, answers), rest="What else is known, and what was not measured"))
+    said.append(Sentence("Self-collision, rays", others, place))
     bought = errors[0].sentences if errors else [on_errors(errors)]
-    said.append(Sentence("Time against error", bought, "errors" if errors else "limits", rest="If the future is known"))
-    said.append(Sentence("The paper", parts_on_the_paper(known), "claims", first=2))
-    said.append(Sentence("This run", [on_disturbance(study)], "limits"))
+    said.append(Sentence("Time against error", bought, "errors" if errors else "limits"))
+    said.append(Sentence("The paper", parts_on_the_paper(known), "claims"))
+    said.append(Sentence("This run", on_disturbance(study), "limits"))
     return said
 
 

@@ -126,7 +126,7 @@ def data(study: Study, title: str, claims: Optional[paper_claims.Claims], folder
 
 
 def kept(file: Path = summary.REFERENCE / cells_file.FILE) -> Optional[dict[str, Any]]:
-    """Returns the cells that come with the project, for questions that the results do not answer; None without such a file.
+    """Returns the cells that come with the project, each once, for questions that the results do not answer; None without such a file.
 
     Raises ResultError for a cell whose title has no size or no l.
     """
@@ -134,7 +134,7 @@ def kept(file: Path = summary.REFERENCE / cells_file.FILE) -> Optional[dict[str,
         return None
     found = cells_file.read(file)
     cells = []
-    for cell in found.cells:
+    for cell in advice.counted(found.cells):
         parts = re.search(r", ([\d.]+)([kM]?), l = ([\d.]+)", cell.title)
         if parts is None:
             raise ResultError(f"{file}: the cell {cell.title} has no size or no l in its title.")

@@ -53,7 +53,7 @@ class Place:
     """All strategies on one scene and size."""
 
     scene: str
-    size: float
+    size: float  #: primitives of all bodies, those at rest included, as everywhere in a report but in the paper's claims
     depths: list[float]
     rows: list[Row]
 
@@ -99,11 +99,11 @@ def baselines_of(table: Table, declared: Sequence[dict[str, Any]]) -> list[tuple
 
 
 def places(table: Table, declared: Sequence[dict[str, Any]]) -> tuple[list[str], list[Place], list[str]]:
-    """Returns the names of the baselines, every scene and size with at least two l, and the names of those with one l."""
+    """Returns the names of the baselines, every scene and size (of all bodies together) with at least two l, and the names of those with one l."""
     baselines = baselines_of(table, declared)
     found, single = [], []
     for scene in dict.fromkeys(table.rows["scene"]):
-        listed = table.places(scene)
+        listed = [(float(rows[0]["primitives"]), l, rows) for _, l, rows in table.places(scene)]
         for size in sorted({size for size, _, _ in listed}):
             at = [(l, rows) for one, l, rows in listed if one == size]
             if len(at) < 2:

@@ -222,12 +222,39 @@ def sentences(study: Study, place: Place) -> list[str]:
     return list(told.values())
 
 
+#: What makes a sentence's number doubtful.
+NOT_APART, DISTURBED = "this run does not tell them apart", "a doubtful run: the machine was disturbed"
+#: The same in short.
+DOUBTS = {NOT_APART: "not told apart", DISTURBED: "a doubtful run"}
+
+
+def brief(place: Place) -> str:
+    """Returns what errors buy in one short sentence: if nothing of the future is known or, without exact contestants of that kind, whatever is known."""
+    usable = [one for one in place.points if one.foresight == "none"] if place.unknowing else place.points
+    known = "" if not place.unknowing else " if nothing is known"
+    exact = next((one for one in usable if one.exact), None)
+    few = next((one for one in usable if not one.exact and one.missed < FEW), None)
+    allowed = f"{FEW:.0%}".replace("%", "\u00a0%")
+    where = ", ".join(place.title.split(", ")[:2])  # scene and size
+    if exact is None:
+        return f"No exact contestant was measured where one answers wrongly ({where})."
+    if few is None:
+        return f"No approximate contestant missed less than {allowed} of the pairs{known}; the exact {exact.title} takes {text.milliseconds(exact.time)} ms ({where})."
+    doubt = next((f", {brief}" for whole, brief in DOUBTS.items() if place.sentences and whole in place.sentences[0]), "")
+    times = text.factor(max(exact.time, few.time) / min(exact.time, few.time))
+    buys = f"makes a frame {times} times as fast{known}" if few.time < exact.time else f"gains nothing{known}"
+    return (
+        f"Missing up to {allowed} of the pairs {buys}: {text.milliseconds(few.time)} ms by {few.title}, "
+        f"{text.milliseconds(exact.time)} ms exactly by {exact.title} ({where}{doubt})."
+    )
+
+
 def _times_as_fast(study: Study, quick: Point, slow: Point) -> str:
     """Writes how many times as fast the first is, with the interval and what makes the number doubtful."""
     found = ratios.ratio(study, quick.run, slow.run, "with_motion")
     doubts = [f"{text.factor(found.low)} to {text.factor(found.high)}"] if found and found.low < found.high else []
-    doubts += ["a doubtful run: the machine was disturbed"] if found and found.disturbed else []
-    doubts += [] if found is None or found.low > 1 else ["this run does not tell them apart"]
+    doubts += [DISTURBED] if found and found.disturbed else []
+    doubts += [] if found is None or found.low > 1 else [NOT_APART]
     return f"{text.factor(slow.time / quick.time)} times as fast" + (f" ({'; '.join(doubts)})" if doubts else "")
 
 

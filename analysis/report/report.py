@@ -16,7 +16,7 @@ import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
-from advice import advice, kept_costs, summary
+from advice import advice, kept_costs, summary, top
 from claims import claim_pictures, claims as paper_claims
 from claims.claim_points import ClaimError, Table
 from explorer import explore
@@ -109,14 +109,17 @@ def write(
     situations = advice.situations(cells)
     errors = time_error_panels.shown(time_error.places(study))
     known = summary.paper(claims, folder)
-    sentences = summary.sentences(study, situations, errors, known)
+    lines = top.lines(study, situations, errors, known)
     anchors = {rows["group"].iloc[0]: group.anchor for rows, group in zip(study.groups(), groups)}
     page = render(
         title=title,
         explorer=explorer,
         questions=_questions(study),
         study=study,
-        sentences=sentences,
+        top=lines,
+        top_words=top,
+        small_chart=summary.chart(top.shown(situations)),
+        answers=summary.sentences(study, situations, errors, known),
         chart=summary.chart(situations),
         lines=summary.lines(study, cells),
         anchors=anchors,
@@ -139,6 +142,7 @@ def write(
         wanted=targets_table.wanted,
         within=targets_table.within,
         significant=text.significant,
+        factor=text.factor,
         milliseconds=text.milliseconds,
         size=text.size,
         sections=sections.sections(study, groups, all_looks, folder / "figures", which),
@@ -157,7 +161,7 @@ def write(
     )
     path = folder / "report.html"
     files.write_whole(path, page)
-    return Made(path, [f"{one.subject}: {one.says}" for one in sentences])
+    return Made(path, [f"{one.subject}: {one.says}" for one in lines])
 
 
 def _questions(study: Study) -> list[tuple[str, str]]:
@@ -174,8 +178,8 @@ def _break_even(
     if which == "none" or not places:
         return None
     reading = (
-        "A bar begins at the l from which on a strategy is faster than a baseline, and ends at the largest measured l. Sizes count the moving body only. An open arrow "
-        "marks the largest measured l of a strategy that is slower at every measured l: its break-even point is unknown. Between measured l "
+        "A bar begins at the l from which on a strategy is faster than a baseline, and ends at the largest measured l. Sizes are "
+        "triangles of both bodies together, those at rest included. An open arrow marks the largest measured l of a strategy that is slower at every measured l: its break-even point is unknown. Between measured l "
         "the ratio is interpolated on logarithmic axes; nothing is extrapolated. Names have only the settings in which contestants of a strategy "
         "differ."
     )

@@ -194,6 +194,30 @@ class TestRule(unittest.TestCase):
                 self.assertEqual(best.id, "join")
                 self.assertIn(f"({word} ", best.says)
 
+    def test_a_cell_that_two_plans_measured_counts_once(self) -> None:
+        few = [line("refit", 2.0), other("join", 1.0)]
+        many = [line("refit", 2.0), other("join", 4.0), other("tree", 8.0)]
+        for one in many:
+            one["scene"].update(frames=7)  # of the same scene, size, scalar and l
+        elsewhere = [line("refit", 2.0, "ball"), other("join", 1.0, "ball")]
+        for lines in (few + many + elsewhere, many + few + elsewhere):
+            found = advice.cells(study(lines))
+            self.assertEqual(len(found), 3, "both are in the tables")
+            (one,) = advice.situations(found)
+            self.assertEqual(one.cells, 2)
+            best = one.advice[0][1]
+            assert best is not None
+            self.assertAlmostEqual(best.speed, 1.0, msg="by the measurement with more strategies the join has 1/2 there, and 2 elsewhere")
+        later = [line("refit", 2.0), other("join", 0.5)]
+        for one in later:
+            one["scene"].update(frames=9)
+        for lines, speed in ((few + later, 4.0), (later + few, 2.0)):
+            best = taken(lines)[0]
+            self.assertEqual((best.cells, round(best.speed, 6)), (1, speed), "of equal ones the newest")
+        for one in later:
+            one["machine"] = {**synthetic.MACHINE, "cpu": "another"}
+        self.assertEqual(taken(few + later)[0].cells, 2, "another machine is another cell")
+
     def test_cells_without_a_refit_count_nowhere(self) -> None:
         alone = [other("one", 1.0, "ball"), other("two", 2.0, "ball")]
         self.assertEqual(len(advice.cells(study([*alone, line("refit", 2.0), other("one", 1.0)]))), 1)
@@ -246,7 +270,8 @@ class TestGuide(unittest.TestCase):
             self.assertEqual(cells_file.table(cells_file.read(file)), cells_file.table(found))
             self.assertEqual(cells_file.read(file).told, found.told)
             both = cells_file.gathered([file, file])
-            self.assertEqual([one.cells for one in advice.situations(both.cells)], [2 * one.cells for one in advice.situations(found.cells)])
+            self.assertEqual(len(both.cells), 2 * len(found.cells))
+            self.assertEqual(cells_file.markdown(advice.situations(both.cells)), cells_file.markdown(advice.situations(found.cells)), "each cell counts once")
             for old, new, why in (("kbvh-cells-1", "kbvh-cells-0", "schema"), ('"speeds"', '"speed"', "speeds"), ('"join": [', '"join2": [', "belong together")):
                 file.write_text(cells_file.content(found).replace(old, new), encoding="utf-8")
                 self.assertRaisesRegex(ResultError, why, cells_file.read, file)

@@ -106,7 +106,18 @@ class TestStudies(shared.InFolder):
     def test_sizes_with_one_l_are_named_and_have_none(self) -> None:
         lines = self.lines({"bottom_up": {10: 1.0}, "kinetic_aabb": {10: 0.5}}, 2000)
         _, found, single = self.places(lines)
-        self.assertEqual((found, single), ([], ["tablecloth 2k (l = 10)"]))
+        self.assertEqual((found, single), ([], ["tablecloth 2.4k (l = 10)"]))
+
+    def test_sizes_are_of_all_bodies(self) -> None:
+        updates = {"bottom_up": {1: 1.0, 10: 1.0}, "kinetic_aabb": {1: 4.0, 10: 0.25}}
+        lines = self.lines(updates)
+        self.assertEqual([body["moving"] for body in lines[0]["scene"]["bodies"]], [True, False])
+        self.assertEqual([place.size for place in self.places(lines)[1]], [16400], "16,000 triangles that move, and 400 at rest")
+        for one in lines:  # another table under the cloth is another scene: nothing is interpolated between the two
+            if one["scene"]["per_keyframe"] == 10:
+                one["scene"].update(name="tablecloth-16000-900", primitives=16900)
+                one["scene"]["bodies"][1]["primitives"] = 900
+        self.assertEqual(self.places(lines)[1:], ([], ["tablecloth 16k (l = 1)", "tablecloth 17k (l = 10)"]))
 
     def test_page_has_the_figure(self) -> None:
         lines = self.lines({"bottom_up": {1: 1.0, 10: 1.0}, "bottom_up_period": {1: 1.0, 10: 1.0}, "kinetic_aabb": {1: 4.0, 10: 0.25}})
@@ -115,6 +126,7 @@ class TestStudies(shared.InFolder):
         page = (self.folder / "report.html").read_text(encoding="utf-8")
         part = page[page.index('id="break-even"') :]
         part = part[: part.index("</details>")]
+        self.assertIn("triangles of both bodies together", part)
         self.assertIn("largest measured l", part, "what lies beyond the measured l is said to be unknown")
         self.assertEqual(part.count("<figure>"), 1)
         self.assertTrue((self.folder / "figures" / "break-even.pdf").exists())

@@ -6,6 +6,7 @@ import contextlib
 import io
 import itertools
 import json
+import re
 import shutil
 import subprocess
 import unittest
@@ -17,6 +18,7 @@ import paths  # noqa: F401  (finds the modules under test)
 import shared
 import synthetic
 
+from advice import advice
 from claims import claims
 from explorer import explore, explorer_data
 from figures import colours
@@ -143,11 +145,14 @@ class TestData(Folder):
         file = explorer_data.summary.REFERENCE / "cells.json"
         kept = explorer_data.kept(file)
         assert kept is not None
-        raw = json.loads(file.read_text())
-        self.assertEqual([one["title"] for one in kept["cells"]], [one["title"] for one in raw["cells"]])
-        for one, other in zip(kept["cells"], raw["cells"]):
+        most: dict[tuple[str, str], set[str]] = {}  # strategies of each cell; of a cell that two plans measured, of the measurement with more
+        for one in json.loads(file.read_text())["cells"]:
+            place = one["title"], one["asks"]
+            most[place] = max(most.get(place, set()), set(one["speeds"]), key=len)
+        self.assertEqual([(one["title"], one["asks"]) for one in kept["cells"]], list(most), "each cell once")
+        for one in kept["cells"]:
             self.assertIn(f", {one['size']}, l = {one['l']:g}", one["title"])
-            self.assertEqual(set(one["speeds"]), set(other["speeds"]))
+            self.assertEqual(set(one["speeds"]), most[one["title"], one["asks"]])
             self.assertAlmostEqual(one["speeds"][one["refit"]], 1)
         sizes = {one["title"]: one["primitives"] for one in kept["cells"]}
         self.assertEqual((sizes["dress, 85k, l = 1"], sizes["diffcloth t-shirt, 4k, l = 1"]), (84_912, 4_025))
@@ -183,10 +188,10 @@ class TestData(Folder):
 class TestProgram(Folder):
     """The page's own computations, in Node.js; tests/browser has the rest."""
 
-    def answer(self, program: str) -> Any:
+    def answer(self, program: str, newest_of: tuple[str, ...] = load.ONE_OF_ALL_COMMITS) -> Any:
         """Returns what a module prints as JSON; `data` is the data of the page, `src` the folder of the page's modules."""
         src = (Path(explore.__file__).parent / "src").as_uri()
-        data = json.dumps(explorer_data.data(load.load(self.folder), "", None, self.folder))
+        data = json.dumps(explorer_data.data(load.load(self.folder, newest_of), "", None, self.folder))
         text = f"const data = {data};\n" + program.replace("SRC", src)
         told = subprocess.run(["node", "--input-type=module"], input=text, capture_output=True, text=True)
         self.assertEqual(told.returncode, 0, told.stderr)
@@ -224,6 +229,54 @@ class TestProgram(Folder):
                     for one, other in zip(got[:3], wanted[:3] if len(wanted) > 1 else wanted * 3):
                         self.assertAlmostEqual(one / other, 1, delta=2e-3)
                     self.assertEqual(got[3], len(wanted) > 1 and wanted[3])
+
+
+    def test_the_recommended_line_is_the_brightest_on_the_dark_page(self) -> None:
+        synthetic.write(self.folder, [synthetic.record(one, "s", 2000, "float", 10) for one in synthetic.CONTESTANTS])
+        found = self.answer("""
+            import { model } from "SRC/model.js";
+            import { leading } from "SRC/looks.js";
+            const all = model(data).contestants;
+            const lists = all.map((one) => leading([one, ...all.filter((other) => other !== one)]));
+            console.log(JSON.stringify(lists.map((list) => list.map((one) => [one.look.dark, one.paint ?? ""]))));""")
+        self.assertGreater(len(found), 10)
+        brightened = 0
+        for (own, paint), *others in found:
+            share = re.search(r" (\d+)%", paint)
+            shown = colours.mix(own, 1 - int(share[1]) / 100) if share else own
+            brightened += share is not None
+            self.assertEqual({paint for _, paint in others}, {""})
+            for other, _ in others:
+                self.assertGreaterEqual(colours.contrast(shown, "#000000"), colours.contrast(other, "#000000"), f"{own} among others")
+        brightest = max((one[0][0] for one in found), key=lambda one: colours.contrast(one, "#000000"))
+        self.assertEqual(brightened, sum(one[0][0] != brightest for one in found), "the brightest one keeps its colour")
+
+    def test_cells_count_as_in_the_report(self) -> None:
+        # One scene in clips of two lengths, by two plans: the measurement with more strategies counts, of equal ones the newest. A strategy
+        # that was measured again, by a newer program, has its newest run.
+        def both(times: dict[str, float], frames: int, commit: str = "a") -> list[dict[str, Any]]:
+            made = [line(id, [time], family="refit" if id == "refit" else "kinetic") for id, time in times.items()]
+            for one in made:
+                one.update(commit=commit)
+                one["scene"].update(frames=frames)
+            return made
+
+        few, many, later = both({"refit": 2, "join": 0.5}, 9), both({"refit": 2, "join": 1, "tree": 4}, 7), both({"refit": 2, "join": 0.25}, 5)
+        for lines in (few, few + many, many + few, few + later, later + few, many + both({"join": 8}, 7, "b"), many + both({"refit": 4, "join": 8}, 7, "b")):
+            synthetic.write(self.folder, lines)
+            found = self.answer("""
+                import { model } from "SRC/model.js";
+                import { situations } from "SRC/advice.js";
+                const told = (one) => one && [one.id, one.speed, one.own.length];
+                console.log(JSON.stringify(situations(model(data)).map((one) => [one.asks, one.cells, one.advice.map(told)])));""", load.ONE_OF_EACH_COMMIT)
+            wanted = advice.situations(advice.cells(load.load(self.folder)))
+            self.assertEqual([(asks, cells) for asks, cells, _ in found], [(one.asks, one.cells) for one in wanted])
+            self.assertEqual([one.cells for one in wanted], [1])
+            for (_, _, told), one in zip(found, wanted):
+                for own, (_, best) in zip(told, one.advice):
+                    assert best is not None
+                    self.assertEqual((own[0], own[2]), (best.id, best.measured))
+                    self.assertAlmostEqual(own[1] / best.speed, 1)
 
 
 class TestPage(Folder):

@@ -113,15 +113,33 @@ class TestPage(ReportCase):
         with self.subTest("a second run gives the same page"):
             self.assertEqual(self.page(small(), figures="main"), page)
 
-    def test_all_but_answers_and_errors_is_folded(self) -> None:
+    def test_the_top_is_five_short_sentences_and_one_small_chart(self) -> None:
         page = self.page(synthetic.study())
-        self.assertEqual(re.findall(r'<section id="([^"]*)"', page), ["answers", "errors"])
+        top = re.sub(r"(?s)<details.*", "", page)
+        said = re.findall(r"<li>(.*)</li>", top)
+        self.assertEqual([re.sub("<.*?>", "", one).split("  ")[0] for one in re.findall(r'<a href="#[a-z-]+">.*?</a>', "".join(said))],
+                         ["What to take", "Self-collision, rays", "Time against error", "The paper", "This run"])  # fmt: skip
+        for one in said:
+            self.assertLess(len(re.sub("<.*?>", "", one)), 300, one)
+        self.assertEqual(top.count("<figure"), 1)
+        self.assertEqual(top.count("<figcaption"), 2)
+        words = re.sub("<.*?>", " ", top[top.index("<body>") :]).split()
+        self.assertLess(len(words), 400)
+        for place in re.findall(r'href="#([^"]*)"', top):
+            self.assertIn(f'id="{place}"', page)
+        code, out, _ = self.run_report("--figures", "none")
+        self.assertEqual(code, 0)
+        self.assertEqual(re.findall(r"(?m)^(What to take|Self-collision, rays|Time against error|The paper|This run): ", out),
+                         ["What to take", "Self-collision, rays", "Time against error", "The paper", "This run"])  # fmt: skip
+
+    def test_all_but_the_answers_is_folded(self) -> None:
+        page = self.page(synthetic.study())
+        self.assertEqual(re.findall(r'<section id="([^"]*)"', page), ["answers"])
         # What only a phone folds is open until the page's script has seen that the window is narrow; without a script nothing is lost.
         self.assertNotRegex(page, r'<details(?! class="fold")[^>]* open')
         self.assertGreater(page.count('<details class="fold" open><summary>'), 1)
         self.assertNotRegex(page, r'<details class="fold"(?! open)')
-        rest = re.sub(r'(?s)<section id="errors">.*?</section>', "", page)
-        self.assertNotIn("<table", re.sub(r"(?s)<details.*</details>", "", rest), "before the first part that is folded, and after the last")
+        self.assertNotIn("<table", re.sub(r"(?s)<details.*</details>", "", page), "before the first part that is folded, and after the last")
         self.assertEqual(page.count('<details class="part"'), page.count("<summary><h2>"))
 
     def test_long_tables_have_the_fastest_settings_and_the_refit(self) -> None:

@@ -242,14 +242,31 @@ class TestTimeError(unittest.TestCase):
             self.assertEqual(time_error_file.main([str(synthetic.write(Path(name), [exact("refit", 2.0), exact("tree", 1.0)]))]), 2)
             self.assertIn("wrongly", out.getvalue())
 
-    def test_it_follows_the_answers_where_there_is_an_error(self) -> None:
+    def test_the_short_sentence_has_both_times_and_the_doubt(self) -> None:
+        study = self.study([exact("refit", 2.0), exact("slow", 3.0), wrong("bad", 0.5, 11), wrong("good", 1.0, 9, dial=3)])
+        (place,) = time_error.places(study)
+        self.assertEqual(
+            time_error.brief(place),
+            "Missing up to 1\u00a0% of the pairs makes a frame 2.00 times as fast if nothing is known: 1.00 ms by good, 2.00 ms exactly by refit (cloth, 4k triangles).",
+        )
+        place.sentences[0] = place.sentences[0].replace("times as fast", f"times as fast ({time_error.NOT_APART})", 1)
+        self.assertTrue(time_error.brief(place).endswith("(cloth, 4k triangles, not told apart)."))
+        for lines, said in (
+            ([exact("refit", 1.0), wrong("good", 1.5, 1)], "gains nothing if nothing is known: 1.50 ms by good, 1.00 ms exactly by refit"),
+            ([exact("refit", 1.0), wrong("bad", 0.5, 500)], "No approximate contestant missed less than 1\u00a0% of the pairs if nothing is known; the exact refit takes 1.00 ms"),
+            ([exact("clip", 2.0, foresight="whole_clip"), wrong("good", 1.0, 1)], "makes a frame 2.00 times as fast: 1.00 ms by good, 2.00 ms exactly by clip"),
+        ):  # fmt: skip
+            self.assertIn(said, time_error.brief(self.place(lines)))
+
+    def test_it_is_the_first_part_below_the_answers_where_there_is_an_error(self) -> None:
         for lines, there in (([exact("refit", 2.0), wrong("a", 1.0, 5)], True), ([exact("refit", 2.0), exact("tree", 1.0)], False)):
             with tempfile.TemporaryDirectory(prefix="kbvh-analysis-") as name, contextlib.redirect_stdout(io.StringIO()):
                 folder = synthetic.write(Path(name), lines)
                 self.assertEqual(report.main([str(folder), "--figures", "none"]), 0)
                 page = (folder / "report.html").read_text(encoding="utf-8")
-            found = re.findall(r'<section id="([^"]*)"', page)
-            self.assertEqual(found, ["answers", "errors"] if there else ["answers"])
+            self.assertEqual(re.findall(r'<section id="([^"]*)"', page), ["answers"])
+            parts = re.findall(r'<details class="part" id="([^"]*)"', page)
+            self.assertEqual(parts[:2], ["errors", "full"] if there else ["full", "glance"])
             self.assertEqual('href="#errors"' in page, there)
 
     def test_names_are_escaped(self) -> None:

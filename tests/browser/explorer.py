@@ -2,7 +2,7 @@
 
 usage: explorer.py KBVH_PROGRAM [--keep FOLDER]
 
-Makes pages of the reference run, of a merged study and of more than 10 MB of results, computes what they should show, and lets
+Makes pages of the reference run, of a merged study, of one with wrong contestants and of more than 10 MB of results, computes what they should show, and lets
 explorer.mjs look. Exit code 77 (skipped) where a tool is missing.
 """
 
@@ -47,7 +47,7 @@ def main() -> int:
         return 1
     with tempfile.TemporaryDirectory(prefix="kbvh-explorer-") as folder:
         place = Path(sys.argv[3]) if sys.argv[2:3] == ["--keep"] else Path(folder)
-        pages = {"reference": reference(place), "merged": merged(place, program), "large": large(place)}
+        pages = {"reference": reference(place), "merged": merged(place, program), "erring": erring(place), "large": large(place)}
         expected = place / "expected.json"
         expected.write_text(json.dumps(pages))
         environment = {**os.environ, "KBVH_BROWSER": browser, "KBVH_EXPLORER": str(ANALYSIS / "explorer"), "KBVH_PROGRAM": program}
@@ -186,6 +186,18 @@ def merged(place: Path, program: str) -> dict[str, Any]:
     expected["one"] = {"results": str(place / "one" / "results.jsonl"), "scene": "<b>&\"scene\"", "runs": 54}
     expected["records"] = sum(1 for _ in (folder / "results.jsonl").open())
     return expected
+
+
+def erring(place: Path) -> dict[str, Any]:
+    """A study in which contestants answer wrongly: its report has time against error."""
+    import synthetic
+
+    folder = place / "erring"
+    wanted = ("bottom_up", "kinetic_aabb", "fcl_own_verdict", "student_margin")
+    lines = [synthetic.record(one, "tablecloth", 2000, "float", l) for l in (1, 10) for one in synthetic.CONTESTANTS if one["id"] in wanted]
+    synthetic.write(folder, lines)
+    write(folder)
+    return {"page": str(folder / "explorer.html"), "report": str(folder / "report.html")}
 
 
 def large(place: Path) -> dict[str, Any]:

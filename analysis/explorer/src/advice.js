@@ -40,17 +40,17 @@ export const ASKS = { [PAIRS]: "two bodies", "pairs within a body, too": "one bo
 export const classOf = (classes, number) =>
   Object.keys(classes).find((key) => key !== "any" && classes[key].from <= number && number < classes[key].to);
 
-/** Returns the cells that count, each with its best refit and, by strategy, its fastest run and its speed over that refit. */
+/**
+ * Returns the cells that count, each with its best refit and, by strategy, its fastest run and its speed over that refit. Of runs of one
+ * contestant the newest counts, also if it failed, as in the report; of several measurements of one cell, `countedOnce`.
+ */
 export function countedCells(model) {
   if (model.counted) return model.counted;
-  const newest = new Map(); // of cells that several commits measured
-  for (const cell of model.cells) {
-    const key = `${cell.problem}~${cell.machine.index}~${cell.asks}`;
-    if (!newest.has(key) || newest.get(key).commit.index <= cell.commit.index) newest.set(key, cell);
-  }
-  model.counted = [...newest.values()].flatMap((cell) => {
+  const asked = ({ cell }) => [cell.problem, cell.machine.index, cell.asks].join("~");
+  const newest = new Set(new Map(model.runs.map((run) => [`${asked(run)}~${run.contestant.index}`, run])).values());
+  const found = model.cells.flatMap((cell) => {
     const runs = new Map();
-    const usual = cell.runs.filter((run) => run.contestant.usual);
+    const usual = cell.runs.filter((run) => run.contestant.usual && newest.has(run));
     for (const run of usual) {
       const time = value(model, run, "with_motion");
       const known = runs.get(run.contestant.id);
@@ -61,7 +61,25 @@ export function countedCells(model) {
     const speeds = new Map([...runs].map(([id, run]) => [id, quotient(run, refit, model.place, "with_motion")]));
     return [{ cell, refit, runs, speeds }];
   });
+  model.counted = countedOnce(found);
   return model.counted;
+}
+
+/**
+ * Returns every cell once: of a cell that several plans measured, for example in clips of different lengths, the measurement with the most
+ * strategies; of equal ones the newest. The rule of `counted` in analysis/advice/advice.py.
+ */
+export function countedOnce(every) {
+  const chosen = new Map();
+  const last = ({ runs }) => Math.max(...[...runs.values()].map((run) => run.index));
+  for (const one of every) {
+    const { cell } = one;
+    const identity = [cell.shown, cell.primitives, cell.scalar, cell.l, cell.asks, cell.machine.index].join("~");
+    const known = chosen.get(identity);
+    const more = known ? one.runs.size - known.runs.size || last(one) - last(known) : 1;
+    if (more >= 0) chosen.set(identity, one);
+  }
+  return [...chosen.values()];
 }
 
 /** Ranks the strategies that need to know no more than `known`, the best first: the rule takes the first. */

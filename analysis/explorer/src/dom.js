@@ -79,11 +79,12 @@ export async function copy(text, button) {
   setTimeout(() => (button.textContent = said), 1500);
 }
 
-/** Fades the right edge, or else the lower one, of what can be scrolled there, so that nothing looks as if it ended. */
+/** Says of what is wider than its frame that it scrolls, and fades the right edge, or else the lower one, where more is hidden. */
 export function hintScrolling(root) {
   for (const one of root.querySelectorAll(".scroll, .plot-scroll")) {
     const mark = () => {
       const right = one.scrollLeft + one.clientWidth < one.scrollWidth - 2;
+      one.classList.toggle("wide", one.clientWidth < one.scrollWidth - 2);
       one.classList.toggle("more", right);
       one.classList.toggle("more-below", !right && one.scrollTop + one.clientHeight < one.scrollHeight - 2);
     };

@@ -23,6 +23,21 @@ function onDark(colour, dark, contrast) {
   return "#FFFFFF";
 }
 
+/**
+ * Returns contestants of which the first, the recommended one, is at least as bright on the dark page as each of the others: its colour there
+ * is mixed with as much white (`--strong` of style.css, which the light page does not have) as that takes.
+ */
+export function leading(contestants) {
+  const [first, ...others] = contestants;
+  if (!first) return [];
+  const wanted = Math.max(0, ...others.map((one) => luminance(one.look.dark)));
+  let share = 0;
+  while (share < 20 && luminance(mix(first.look.dark, share / 20)) < wanted) share += 1;
+  if (!share) return contestants;
+  const own = `var(--contestant-${first.index})`;
+  return [{ ...first, paint: `color-mix(in srgb, ${own} ${100 - 5 * share}%, var(--strong, ${own}))` }, ...others];
+}
+
 /** Returns the looks of rows' contestants. Families that the palette does not know take its free ones in turn. */
 export function looks(rows, palette) {
   const unique = [...new Map(rows.map((row) => [row.contestant, row])).values()];

@@ -128,11 +128,13 @@ function tools(uses, current) {
   host.tools.replaceChildren(...uses.map((name) => all[name]()).filter(Boolean));
 }
 
-/** A legend of series or strategies, with a button for lines that are not drawn; or of runs; or of entries. */
-function legend(names, others = 0) {
+/** A legend of series or strategies, with a button for lines that are not drawn; or of runs; or of entries. `looks` changes the contestants' looks. */
+function legend(names, others = 0, looks = (contestants) => contestants) {
   const named = (name) =>
     seriesOfName(model, { per: model.contestants.some((one) => one.id === name) ? "best" : "each" }, name);
-  const list = legendList(names.map(named).map(({ contestant, label }) => [contestant, label]));
+  const series = names.map(named);
+  const shown = looks(series.map((one) => one.contestant));
+  const list = legendList(series.map(({ label }, i) => [shown[i], label]));
   return list && make("div", { class: "legend-box" }, list, others > 0 && othersButton(others));
 }
 function legendOf(list) {

@@ -367,6 +367,10 @@ await check("time against error opens where contestants err, with missed pairs f
   assert.equal(chosen, wanted);
   assert.ok(others.length > 1 && others.every((text) => text.endsWith(": exact contestants only")), others.join(" | "));
   assert.deepEqual(titles.slice(0, 2), ["Missed pairs", "False pairs"]);
+  await drawn(page);
+  const axes = await page.$eval("#view svg.chart", (chart) => ["x", "y"].map((name) => chart.querySelector(`[aria-label="${name}-axis label"]`).textContent));
+  assert.match(axes[0], /ms per frame/, "time to the right and errors upwards, as in the report");
+  assert.match(axes[1], /missed pairs/);
   assert.match(said[0], /^(If nothing|Whatever is known) .*missing up to 1\u202f% of the pairs (makes a frame [\d.]+ times as fast|gains nothing: .* and is [\d.]+ times as fast)/);
   assert.ok(said[0].includes("missed 0.40\u202f%"), said[0]);
   // 332 of the 1000 - 4 + 332 reported pairs are false: the share is of what was reported, as in the report.

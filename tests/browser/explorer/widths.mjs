@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { statSync } from "node:fs";
 
-import { check, expected, leave, load, open } from "../support/explorer.mjs";
+import { check, drawn, expected, leave, load, open } from "../support/explorer.mjs";
 
 const VIEWS = ["answer", "overview", "pairwise", "errors", "scaling", "frames", "versus", "claims", "runs"];
 
@@ -62,6 +62,35 @@ await check("the switch changes the scheme", async () => {
   await page.close();
 });
 
+await check("in the dark scheme the recommended line is at least as bright as the others", async () => {
+  for (const link of ["answer&know=none", "answer&know=next", "answer&know=clip", "scaling"]) {
+    const page = await open("reference", `#view=${link}`, { width: 1440, scheme: "dark" });
+    const charts = await page.$$eval("#view svg.chart", (list) => {
+      const brush = document.createElement("canvas").getContext("2d", { willReadFrequently: true });
+      const luminance = (colour) => {
+        brush.fillStyle = colour;
+        brush.fillRect(0, 0, 1, 1);
+        const [r, g, b] = [...brush.getImageData(0, 0, 1, 1).data].map((c) => (c / 255 <= 0.03928 ? c / 255 / 12.92 : ((c / 255 + 0.055) / 1.055) ** 2.4));
+        return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+      };
+      return list.map((chart) =>
+        [...chart.querySelectorAll('g[aria-label="line"]')].map((line) => {
+          const { stroke, strokeWidth } = getComputedStyle(line);
+          return [parseFloat(strokeWidth), luminance(stroke)];
+        }),
+      );
+    });
+    const shown = charts.filter((lines) => lines.some(([width]) => width === 3));
+    assert.ok(shown.length > 0, link);
+    for (const lines of shown) {
+      const others = lines.filter(([width]) => width === 1.5).map(([, bright]) => bright);
+      const [, own] = lines.find(([width]) => width === 3);
+      assert.ok(others.length > 0 && own >= Math.max(...others) - 0.01, `${link}: ${own} and ${others}`);
+    }
+    leave(page);
+  }
+});
+
 // --- the report -------------------------------------------------------------------------------------------------
 
 /** Returns what reaches beyond the window without being in a part that scrolls. */
@@ -73,7 +102,18 @@ const beyond = (page) =>
       .map((one) => one.outerHTML.slice(0, 80));
   });
 
-for (const which of ["reference", "merged"])
+/** Opens every part of a report, and leaves what only a phone folds as the page's script has it. */
+const unfold = (page) => page.evaluate(() => document.querySelectorAll("details:not(.fold)").forEach((one) => (one.open = true)));
+
+/** Returns what scrolls sideways in its own frame, each with whether the frame says so. */
+const scrolling = (page) =>
+  page.$$eval(".scroll", (list) =>
+    list
+      .filter((one) => one.scrollWidth > one.clientWidth + 2)
+      .map((one) => [one.classList.contains("more") && getComputedStyle(one, "::before").content.includes("scrolls sideways"), one.innerText.slice(0, 80)]),
+  );
+
+for (const which of ["reference", "merged", "erring"])
   for (const [width, scheme] of [
     [1280, "light"],
     [1280, "dark"],
@@ -85,23 +125,45 @@ for (const which of ["reference", "merged"])
       assert.ok(statSync(expected[which].report).size < 2e6);
       const page = await open(which, "", { width, scheme, file: "report" });
       const tall = await page.evaluate(() => document.documentElement.scrollHeight);
-      // Five screens: of a desktop, and of a phone of 390 x 844.
-      if (width !== 800) assert.ok(tall <= 5 * (width === 1280 ? 900 : 844), `${tall} pixels`);
-      const folds = await page.$$eval(".fold", (list) =>
-        list.filter((one) => !one.parentElement.closest("details:not([open])")).map((one) => [one.open, one.querySelector("summary").offsetHeight > 0, one.querySelector("summary").textContent]),
-      );
-      assert.ok(folds.length > 2);
+      // Of a desktop, and of a phone of 390 x 844.
+      if (width !== 800) assert.ok(tall <= (width === 1280 ? 2 * 900 : 3 * 844), `${tall} pixels`);
+      const rows = await page.$$eval(".sentences li", (list) => list.map((one) => Math.round(one.offsetHeight / parseFloat(getComputedStyle(one).lineHeight))));
+      assert.equal(rows.length, 5);
+      if (width === 1280) assert.ok(Math.max(...rows) <= 2, `sentences of ${rows} lines`);
+      if (width === 1280) assert.ok((await page.$eval("#answers", (one) => one.getBoundingClientRect().bottom)) <= 900, "the answers are on the first screen");
+      assert.deepEqual(await beyond(page), []);
+      const contrast = await page.evaluate(() => getComputedStyle(document.documentElement).color);
+      assert.equal(contrast === "rgb(29, 33, 41)", scheme === "light");
+      await unfold(page);
+      await drawn(page);
+      const folds = await page.$$eval(".fold", (list) => list.map((one) => [one.open, one.querySelector("summary").offsetHeight > 0, one.querySelector("summary").textContent]));
+      assert.equal(folds.length > 2, which === "erring");
       for (const [isOpen, named, title] of folds) {
         assert.equal(isOpen, width > 760, title);
         assert.equal(named, width < 760 && title !== "", title);
       }
-      assert.deepEqual(await beyond(page), []);
-      const contrast = await page.evaluate(() => getComputedStyle(document.documentElement).color);
-      assert.equal(contrast === "rgb(29, 33, 41)", scheme === "light");
       await page.evaluate(() => document.querySelectorAll("details").forEach((one) => (one.open = true)));
+      await drawn(page);
       assert.deepEqual(await beyond(page), [], "unfolded");
+      assert.ok((await page.evaluate(() => document.documentElement.scrollWidth)) <= width, "the page is wider than the window");
+      const wide = await scrolling(page);
+      if (width === 390) assert.ok(wide.length > 1, "wide tables scroll");
+      for (const [said, text] of wide) assert.ok(said, `it scrolls without a hint: ${text}`);
       leave(page);
     });
+
+await check("a hint stays at the edge while a table is scrolled, and the fade ends with it", async () => {
+  const page = await open("reference", "", { width: 390, file: "report" });
+  await unfold(page);
+  await drawn(page);
+  const table = await page.$("#glance .scroll");
+  const faded = () => table.evaluate((one) => [one.classList.contains("wide"), one.classList.contains("more")]);
+  assert.deepEqual(await faded(), [true, true]);
+  await table.evaluate((one) => (one.scrollLeft = one.scrollWidth));
+  await page.waitForFunction((one) => !one.classList.contains("more"), {}, table);
+  assert.deepEqual(await faded(), [true, false]);
+  leave(page);
+});
 
 await check("the report's top answers, and its links unfold what they lead to", async () => {
   const page = await open("reference", "", { file: "report", width: 1280 });
@@ -112,9 +174,14 @@ await check("the report's top answers, and its links unfold what they lead to", 
     "The paper",
     "This run",
   ]);
-  const rule = expected.reference.situations.map(([, , , advice]) => [...new Set(advice.filter(Boolean).map(([id]) => id))].length);
-  assert.equal((await page.$$(".situation:not(.scale)")).length, rule.reduce((a, b) => a + b));
-  await page.click('.sentences p a[href="#kept"]'); // the project's cells
+  const rule = expected.reference.situations.map(([asks, , , advice]) => [asks, [...new Set(advice.filter(Boolean).map(([id]) => id))].length]);
+  const sum = (list) => list.reduce((total, [, count]) => total + count, 0);
+  assert.equal((await page.$$("#full .situation:not(.scale)")).length, sum(rule));
+  const onTop = ["pairs of two bodies", "pairs within a body, too", "rays"];
+  assert.equal((await page.$$("#answers .best:not(.scale)")).length, sum(rule.filter(([asks]) => onTop.includes(asks))));
+  await page.click('#answers a[href="#full"]');
+  await page.waitForFunction(() => document.querySelector("#full").open);
+  await page.click('#full a[href="#kept"]'); // the project's cells
   await page.waitForFunction(() => document.querySelector("#kept").open && document.querySelectorAll("#kept tbody tr").length > 20);
   await page.click('.sentences a[href="#claims"]');
   await page.waitForFunction(() => document.querySelector("#claims").open);
@@ -125,12 +192,13 @@ await check("the report's top answers, and its links unfold what they lead to", 
 });
 
 await check("what a phone folds unfolds by a tap, in a wide window and on paper", async () => {
-  const page = await load("reference", "", { width: 390, file: "report" });
+  const page = await load("erring", "", { width: 390, file: "report" });
+  await unfold(page);
   const folded = () => page.$$eval(".fold", (list) => list.filter((one) => !one.open).length);
   const whole = () => page.waitForFunction(() => [...document.querySelectorAll(".fold")].every((one) => one.open));
   const all = await folded();
   assert.ok(all > 2);
-  await page.click(".sentences .fold summary");
+  await page.click("#errors .fold summary");
   assert.equal(await folded(), all - 1);
   await page.setViewport({ width: 1280, height: 900 });
   await whole();

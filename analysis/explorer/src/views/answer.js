@@ -2,6 +2,7 @@
 import { ASKS, FRAMES, KNOWN, PAIRS, SIZES, classOf, countedCells, matches, nearest, ranked } from "../advice.js";
 import { tableOf } from "../chart.js";
 import { choice, make, symbol } from "../dom.js";
+import { leading } from "../looks.js";
 import { SIX, compare, decided, ratioText, value } from "../model.js";
 import { span } from "../statistics.js";
 import { factor, milliseconds, plural, sceneWords, sentence } from "../words.js";
@@ -238,7 +239,7 @@ function said({ model, state, set }, found, order) {
   return make(
     "section",
     { class: "answer", "aria-live": "polite" },
-    make("p", { class: "take" }, "Take ", symbol(best.contestant), make("strong", { text: best.contestant.title }), `: ${costText(model, best)}.`),
+    make("p", { class: "take" }, "Take ", symbol(looksOf(order)[0]), make("strong", { text: best.contestant.title }), `: ${costText(model, best)}.`),
     make("p", { class: "speed", text: [`That is ${speedText(best)}.`, winsText(best), sureText(model, best)].filter(Boolean).join(" ") }),
     methodText(model, best) && make("p", { class: "method", text: methodText(model, best) }),
     make(
@@ -259,6 +260,9 @@ function said({ model, state, set }, found, order) {
   );
 }
 
+/** Returns the best six as their lines look: the first stands out. */
+const looksOf = (order) => leading(order.slice(0, SIX).map((one) => one.contestant));
+
 /** The time of the six best and of the best refit over l or n, on the scene with the longest sweep. */
 function curve(context, found, order) {
   const { model, state } = context;
@@ -272,7 +276,8 @@ function curve(context, found, order) {
   const other = sweeps(cellsOfL, "primitives", ["l"])[0];
   const [shown, field] = sweep ? [sweep, "l"] : [other, "primitives"];
   const own = { ...context, state: { ...state, measure: "with_motion", per: "best" } };
-  const entries = order.slice(0, SIX).map((one) => [one.contestant, one.contestant.title, speedText(one)]);
+  const looks = looksOf(order);
+  const entries = order.slice(0, SIX).map((one, i) => [looks[i], one.contestant.title, speedText(one)]);
   const legend = context.legendList(entries);
   const rest = order.length - chosen.length;
   const more = rest > 0 && context.othersButton(rest);

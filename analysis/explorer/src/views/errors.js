@@ -109,17 +109,18 @@ function one({ model, state, choose }, error, runs, looks) {
     .map((run) => ({ run, time: value(model, run, state.measure), error: error.of(run) }))
     .filter((p) => p.error !== null && p.error >= 0);
   if (new Set(usable.map((p) => p.error)).size < 2) return null;
+  // As in the report (analysis/figures/time_error_panels.py): time to the right, the error upwards.
   const times = logAxis(usable.map((p) => p.time));
-  // Errors are not clipped: the few that differ are the finding. An error of exactly 0 has its own place, left of all others.
+  // Errors are not clipped: the few that differ are the finding. An error of exactly 0 has its own place, below all others.
   const errors = usable.map((p) => p.error).filter((v) => v > 0);
   const axis = logAxis([], { include: [] });
   if (errors.length) axis.domain = [Math.min(...errors) / 1.1, Math.max(...errors) * 1.1];
   const zero = axis.domain[0] / Math.max((axis.domain[1] / axis.domain[0]) ** 0.12, 1.08);
-  const beside = Math.sqrt(zero * axis.domain[0]);
+  const above = Math.sqrt(zero * axis.domain[0]);
   const points = usable.map((p) => {
-    const [y, side] = times.clip(p.time);
+    const [x, side] = times.clip(p.time);
     const look = looks.get(p.run.contestant.id) ?? p.run.contestant;
-    return { ...p, look, x: p.error === 0 ? zero : p.error, y, side, paint: paintOf(look) };
+    return { ...p, look, x, y: p.error === 0 ? zero : p.error, side, paint: paintOf(look) };
   });
   const front = pareto(points);
   const measure = MEASURES[state.measure];
@@ -129,20 +130,20 @@ function one({ model, state, choose }, error, runs, looks) {
     notes: times.outside ? [`${plural(times.outside, "point")} beyond the axis of time: arrows at its edge.`] : [],
     plot: (width) => ({
       height: 330,
-      marginLeft: 56,
+      marginLeft: 60,
       marginBottom: 44,
       marginRight: 24,
-      x: {
-        ...logScale({ domain: [zero ** 1.25 / axis.domain[0] ** 0.25, axis.domain[1]] }, width - 90, `${error.name} →`),
-        ticks: [zero, ...logScale(axis, (width - 120) * 0.85, "").ticks.filter((t) => t > beside)],
+      x: logScale(times, width - 90, `${measure.name}${measure.unit === "ms" ? ", ms per frame" : ""} →`, { grid: true }),
+      y: {
+        ...logScale({ domain: [zero ** 1.25 / axis.domain[0] ** 0.25, axis.domain[1]] }, 220, `↑ ${error.name}`, { grid: true }),
+        ticks: [zero, ...logScale(axis, 200, "").ticks.filter((t) => t > above)],
         tickFormat: (v) => (v === zero ? "0" : error.format(1) === "100\u202f%" ? `${tick(v * 100)}%` : tick(v)),
       },
-      y: logScale(times, 220, `↑ ${measure.name}${measure.unit === "ms" ? ", ms per frame" : ""}`, { grid: true }),
       marks: [
-        Plot.ruleX([beside], { stroke: "var(--line)", strokeDasharray: "2 3" }),
+        Plot.ruleY([above], { stroke: "var(--line)", strokeDasharray: "2 3" }),
         Plot.line(front, { x: "x", y: "y", stroke: "var(--soft)", strokeWidth: 1, curve: "step-after" }),
         ...points.map((p) => Plot.dot([p], { x: "x", y: "y", ...dotLook(p.look, 4.5) })),
-        clippedMarks(points, "y"),
+        clippedMarks(points, "x"),
       ],
     }),
     points: points.map((p) => ({
@@ -198,7 +199,6 @@ function bargain(model, runs, known) {
 /** Returns the points that no other beats in both coordinates, from left to right. */
 function pareto(points) {
   const front = [];
-  for (const point of points.toSorted((a, b) => a.x - b.x || a.time - b.time))
-    if (!front.length || point.time < front.at(-1).time) front.push(point);
+  for (const point of points.toSorted((a, b) => a.time - b.time || a.y - b.y)) if (!front.length || point.y < front.at(-1).y) front.push(point);
   return front;
 }

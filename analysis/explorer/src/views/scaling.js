@@ -2,6 +2,7 @@
 import * as Plot from "@observablehq/plot";
 import { clippedMarks, dotLook, figure, lineLook, logAxis, logScale } from "../chart.js";
 import { make, paintOf } from "../dom.js";
+import { leading } from "../looks.js";
 import { MEASURES, SIX, endsOf, entrants, seriesOfName, value } from "../model.js";
 import { SCOPES } from "../statistics.js";
 import { plural, tick } from "../words.js";
@@ -39,7 +40,7 @@ export function scaling(context) {
         }),
         figures(context, over_n, "primitives", strong),
       ),
-    context.legend([...strong], names.size - strong.size),
+    context.legend([...strong], names.size - strong.size, leading),
   ].filter(Boolean);
 }
 
@@ -82,7 +83,7 @@ function figures(context, sweeps, field, strong) {
   return [draw(long), more];
 }
 
-/** Draws a sweep: strong lines, and the others pale if they are wanted. */
+/** Draws a sweep: strong lines, of which the first stands out, and the others pale if they are wanted. */
 export function sweepFigure({ model, state, choose }, sweep, field, strong) {
   const measure = MEASURES[state.measure];
   const { first } = sweep;
@@ -101,8 +102,12 @@ export function sweepFigure({ model, state, choose }, sweep, field, strong) {
   const at = [...sweep.cells.keys()].sort((a, b) => a - b);
   const points = [];
   const rows = [];
+  const [recommended] = strong;
+  const [leader] = leading([...strong].map((name) => seriesOfName(model, state, name).contestant));
   const lines = kept.map(([name, line]) => {
     const series = seriesOfName(model, state, name);
+    const best = name === recommended;
+    const contestant = best ? leader : series.contestant;
     const own = line.map(({ at: x, run }) => {
       const time = value(model, run, state.measure);
       const ends = strong.has(name) ? endsOf(model, run, state.measure) : { low: time, high: time }; // pale lines have no bars
@@ -111,6 +116,7 @@ export function sweepFigure({ model, state, choose }, sweep, field, strong) {
         x,
         y,
         run,
+        looks: contestant,
         current: run.key === state.point,
         lines: [
           run.contestant.label,
@@ -124,7 +130,7 @@ export function sweepFigure({ model, state, choose }, sweep, field, strong) {
         side,
         low: axis.clip(ends.low)[0],
         high: axis.clip(ends.high)[0],
-        paint: paintOf(series.contestant),
+        paint: paintOf(contestant),
       };
     });
     rows.push([
@@ -134,7 +140,7 @@ export function sweepFigure({ model, state, choose }, sweep, field, strong) {
         return hit ? measure.format(value(model, hit.run, state.measure)) : "–";
       }),
     ]);
-    return { series, own, pale: !strong.has(name), best: name === [...strong][0] };
+    return { contestant, own, pale: !strong.has(name), best };
   });
   const guides =
     field === "l"
@@ -175,22 +181,22 @@ export function sweepFigure({ model, state, choose }, sweep, field, strong) {
           ),
         ...lines
           .filter((line) => line.pale)
-          .map(({ series, own }) =>
-            Plot.line(own, { x: "x", y: "y", ...lineLook(series.contestant, 1), strokeOpacity: 0.35 }),
+          .map(({ contestant, own }) =>
+            Plot.line(own, { x: "x", y: "y", ...lineLook(contestant, 1), strokeOpacity: 0.35 }),
           ),
-        ...lines.filter((line) => !line.pale).flatMap(({ series, own, best }) => [
+        ...lines.filter((line) => !line.pale).flatMap(({ contestant, own, best }) => [
           Plot.ruleX(own, {
             x: "x",
             y1: "low",
             y2: "high",
-            stroke: paintOf(series.contestant),
+            stroke: paintOf(contestant),
             strokeOpacity: 0.5,
             strokeWidth: 2.4,
           }),
-          Plot.line(own, { x: "x", y: "y", ...lineLook(series.contestant, best ? 3 : 1.5) }),
+          Plot.line(own, { x: "x", y: "y", ...lineLook(contestant, best ? 3 : 1.5) }),
           Plot.dot(
             own.filter((p) => !p.side),
-            { x: "x", y: "y", ...dotLook(series.contestant, best ? 5.5 : 4) },
+            { x: "x", y: "y", ...dotLook(contestant, best ? 5.5 : 4) },
           ),
         ]),
         clippedMarks(

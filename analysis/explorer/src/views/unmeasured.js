@@ -88,12 +88,11 @@ export function keptCosts({ model, state }, found) {
     ms(cell, cell.refit),
     best.id === cell.refit ? "the best refit" : ratioOf(cell, best.id),
   ]);
-  const twice = new Set(found.kept.map((cell) => cell.title)).size < found.kept.length;
   return make(
     "section",
     {},
     make("h2", { text: "What it costs in the project's own measurements" }),
-    make("p", { class: "note", text: sentence(`${plural(rows.length, "cell")}: a cell is one scene at one size, with l frames from a keyframe to the next; sizes are triangles of both bodies together. In parentheses: the 95\u00a0% interval. ?: measured while the machine was disturbed.${twice ? " Two lines of one cell are of two plans." : ""}`) }),
+    make("p", { class: "note", text: sentence(`${plural(rows.length, "cell")}: a cell is one scene at one size, with l frames from a keyframe to the next; sizes are triangles of both bodies together. In parentheses: the 95\u00a0% interval. ?: measured while the machine was disturbed.`) }),
     make("div", { class: "scroll", tabindex: 0 }, tableOf(["scene", `${best.contestant.title}, ms`, "best refit", "ms", "times as fast"], rows)),
   );
 }
