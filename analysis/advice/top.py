@@ -155,7 +155,10 @@ def on_errors(errors: Sequence[time_error_panels.Shown], reference: Path = REFER
         return time_error.brief(errors[0].place)
     file = reference / time_error_file.FILE
     kept = time_error_file.read(file) if file.exists() else []
-    return f"{KEPT}: {time_error.brief(kept[0])}" if kept else "No contestant of this study answers wrongly: it does not say what exactness costs."
+    if not kept:
+        return "No contestant of this study answers wrongly: it does not say what exactness costs."
+    brief = time_error.brief(kept[0])
+    return f"{KEPT}, {brief[0].lower()}{brief[1:]}"
 
 
 #: Where updating a kinetic AABB tree is measured against two refits: how the tree is built, and the refit.
