@@ -2,6 +2,8 @@
 // (core/geometry/volumes/bounding_volume.hpp): it isolates the effect of the kind of volume. With boxes it is
 // a simple refit of a stored tree; `bottom_up` is the fast one.
 
+#include <algorithm>
+
 #include "core/contract/registry.hpp"
 #include "core/families/volumes/volume_strategy.hpp"
 #include "core/geometry/volumes/dop.hpp"

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "core/families/volumes/obb_hierarchy.hpp"
 #include "core/families/volumes/sphere_hierarchy.hpp"
 #include "core/families/volumes/volume_strategy.hpp"

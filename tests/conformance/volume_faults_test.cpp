@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "core/families/volumes/dop_hierarchy.hpp"
 #include "core/families/volumes/volume_strategy.hpp"
 #include "core/geometry/volumes/dop.hpp"
