@@ -178,10 +178,10 @@ def _break_even(
     if which == "none" or not places:
         return None
     reading = (
-        "A bar begins at the l from which on a strategy is faster than a baseline, and ends at the largest measured l. Sizes are "
-        "triangles of both bodies together, those at rest included. An open arrow marks the largest measured l of a strategy that is slower at every measured l: its break-even point is unknown. Between measured l "
-        "the ratio is interpolated on logarithmic axes; nothing is extrapolated. Names have only the settings in which contestants of a strategy "
-        "differ."
+        "A bar begins at the l from which on a strategy is faster than a baseline, and ends at the largest measured l. Sizes are triangles "
+        "of both bodies together, those at rest included. An open arrow marks the largest measured l of a strategy that is slower at every "
+        "measured l: its break-even point is unknown. Between measured l the ratio is interpolated on logarithmic axes; nothing is "
+        "extrapolated. Names have only the settings in which contestants of a strategy differ."
     )
     return picture(
         folder, "break-even", "From which l on kinetic contestants are faster", reading,
