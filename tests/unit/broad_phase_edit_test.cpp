@@ -264,8 +264,8 @@ TYPED_TEST(BroadPhaseEdits, InsertedFacesHaveTheGroupsOfTheirVerticesWhateverOth
   using S = TypeParam;
   const Mesh<S> mesh = crumpled<S>(12, 7);
   const auto vertices = std::uint32_t(mesh.vertex_count());
-  enum class Later { edges, vertices, no_vertices };
-  for (const Later later : {Later::edges, Later::vertices, Later::no_vertices}) {
+  enum class Later { of_edges, of_vertices, of_no_vertices };
+  for (const Later later : {Later::of_edges, Later::of_vertices, Later::of_no_vertices}) {
     Edited<S> edited(mesh, S(0.3));
     const std::uint32_t faces = edited.elements().count(Element::face);
     std::vector<GroupMask> of_vertices, of_faces;
@@ -282,13 +282,13 @@ TYPED_TEST(BroadPhaseEdits, InsertedFacesHaveTheGroupsOfTheirVerticesWhateverOth
     };
     add_groups_of_faces();
     edited.broad.set_vertex_groups(of_vertices);
-    if (later == Later::edges) {
+    if (later == Later::of_edges) {
       edited.broad.set_groups(
           Element::edge, std::vector<GroupMask>(edited.elements().count(Element::edge), GroupMask{4, 4}));
     } else {
-      of_vertices.assign(vertices, later == Later::vertices ? GroupMask{2, 6} : GroupMask{});
+      of_vertices.assign(vertices, later == Later::of_vertices ? GroupMask{2, 6} : GroupMask{});
       edited.broad.set_groups(Element::vertex,
-                              later == Later::vertices ? of_vertices : std::vector<GroupMask>());
+                              later == Later::of_vertices ? of_vertices : std::vector<GroupMask>());
     }
     Mesh<S> part;
     part.faces = {0, 13, 140};
@@ -299,7 +299,7 @@ TYPED_TEST(BroadPhaseEdits, InsertedFacesHaveTheGroupsOfTheirVerticesWhateverOth
                   [&](const Candidate& pair) { return !of_faces[pair.first].admits(of_faces[pair.second]); });
     const bool of_inserted = std::any_of(expected.begin(), expected.end(),
                                          [&](const Candidate& pair) { return pair.second >= faces; });
-    EXPECT_EQ(of_inserted, later != Later::no_vertices);
+    EXPECT_EQ(of_inserted, later != Later::of_no_vertices);
     EXPECT_EQ(difference(edited.broad.candidates(CandidateKind::face_face), expected, edited.elements(),
                          CandidateKind::face_face),
               "");
