@@ -12,7 +12,7 @@ from typing import Optional
 
 from advice import advice, summary
 from advice.advice import Advice, Situation
-from advice.summary import BY_REFERENCE, HERE, MAIN, REFERENCE, Paper
+from advice.summary import BY_REFERENCE, MAIN, REFERENCE, Paper
 from claims.claims import CONDITION, FAILS, HOLDS, OPEN
 from figures import time_error, time_error_file, time_error_panels
 from results import text
@@ -173,12 +173,12 @@ def on_the_paper(found: Paper) -> str:
     decided = sum(here + there for verdict, (here, there) in counts.items() if verdict != OPEN)
     if not decided:
         return "These results decide none of its claims, and no reference run comes with this program."
-    words = {HOLDS: "hold", CONDITION: "hold with a condition", FAILS: "do not hold", OPEN: "are open"}
+    words = {HOLDS: "hold", CONDITION: "hold with a condition", FAILS: "do not", OPEN: "are open"}
     tally = text.listing([f"{sum(counts[verdict])} {word}" for verdict, word in words.items() if verdict != OPEN or sum(counts[verdict])])
     by = [sum(counts[verdict][source] for verdict in words if verdict != OPEN) for source in (0, 1)]
-    whose = [f"{number} by {source}" for number, source in zip(by, (HERE, BY_REFERENCE)) if number]
+    whose = [f"{number} {source}" for number, source in zip(by, ("decided here", f"by {BY_REFERENCE}")) if number]
     main = next((one for one in found.verdicts if one.row.id == MAIN and one.source), None)
-    said = f"Of its {text.plural(len(found.verdicts), 'claim')} {tally} ({text.listing(whose)})."
+    said = f"Of its {text.plural(len(found.verdicts), 'claim')} {tally} ({', '.join(whose)})."
     return f"{said} {answer}" if main is not None and (answer := on_the_main_claim(main)) else said
 
 
@@ -189,7 +189,9 @@ def on_the_main_claim(one: summary.Verdict) -> str:
     told = [(REFITS[refit], spans[f"{tree}:{refit}"]) for refit in REFITS if f"{tree}:{refit}" in spans]
     if tree is None or not told:
         return ""
-    said = [f"{VERBS[summary.answer(span)]}faster than {refit} ({span} times)" for refit, span in told]
+    said: list[str] = []
+    for verb, same in groupby(told, key=lambda one: f"{VERBS[summary.answer(one[1])]}faster"):
+        said.append(f"{verb} {' and '.join(f'than {refit} ({span} times)' for refit, span in same)}")
     return f"Updating a kinetic AABB tree {TREES[tree]} is {', and '.join(said)}."
 
 

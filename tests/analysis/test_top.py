@@ -86,12 +86,14 @@ class TestPaper(unittest.TestCase):
             "Updating a kinetic AABB tree tuned here is faster than a refit as in 2006 (1.04 to 40.1 times), and not faster than today's best refit (0.0081 to 0.66 times).",
         )
         self.assertIn("built as in 2006 is not always faster than a refit as in 2006 (0.1 to 3 times).", top.on_the_main_claim(self.verdict(claims.FAILS, as2006_2006="0.1 to 3")))
+        same = self.verdict(claims.FAILS, best_2006="0.19 to 15.9", best_best="0.028 to 2.31")
+        self.assertIn("is not always faster than a refit as in 2006 (0.19 to 15.9 times) and than today's best refit (0.028 to 2.31 times).", top.on_the_main_claim(same))
         self.assertEqual(top.on_the_main_claim(self.verdict(claims.FAILS)), "")
 
     def test_the_tally_says_who_decides(self) -> None:
         here = summary.Verdict(row("E1", claims.HOLDS), "")
         said = top.on_the_paper(summary.Paper([here, self.verdict(claims.CONDITION), summary.Verdict(row("E2", claims.OPEN), "")], ""))
-        self.assertEqual(said, "Of its 3 claims 1 hold, 1 hold with a condition, 0 do not hold and 1 are open (1 by this study and 1 by the reference run).")
+        self.assertEqual(said, "Of its 3 claims 1 hold, 1 hold with a condition, 0 do not and 1 are open (1 decided here, 1 by the reference run).")
         self.assertIn("decide none", top.on_the_paper(summary.Paper([summary.Verdict(row("E2", claims.OPEN), "")], "")))
 
 
