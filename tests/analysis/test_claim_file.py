@@ -109,12 +109,13 @@ class TestForm(unittest.TestCase):
         scene_names = {scene.get("name") or scene.get("builtin") for scene in scenes}
         ids = {one if isinstance(one, str) else one["id"] for study in studies for one in study.get("strategies", [])}
         for claim in self.said["claims"]:
+            needed = f"{claim['id']}: experiments/plans/paper.json needs a study that measures these"
             for one in claim["checks"]:
-                self.assertLessEqual({*one["scenes"], *one.get("optional_scenes", [])}, scene_names, claim["id"])
+                self.assertLessEqual({*one["scenes"], *one.get("optional_scenes", [])}, scene_names, needed)
                 for corner in self.said["squares"][one["square"]] if "square" in one else [one]:
                     for term in (corner[side] for side in claim_file.SIDES if side in corner):
                         named = {term["strategy"]} if isinstance(term, dict) and "strategy" in term else set()
-                        self.assertLessEqual(named, ids, claim["id"])
+                        self.assertLessEqual(named, ids, needed)
 
     def test_every_key_is_documented(self) -> None:
         text = (paths.HERE.parents[1] / "experiments" / "RESULTS.md").read_text(encoding="utf-8")

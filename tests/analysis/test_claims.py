@@ -136,7 +136,7 @@ class ClaimsCase(shared.InFolder):
 class TestVerdicts(ClaimsCase):
     def test_all_hold_in_a_world_made_as_the_paper_has_it(self) -> None:
         found = {id: (row.verdict, row.why) for id, row in self.rows(world()).items() if id.startswith("E")}
-        self.assertEqual(set(found), set(CONTRADICTIONS))
+        self.assertEqual(set(found), set(CONTRADICTIONS), "a new claim needs a line in CONTRADICTIONS: a change of results that contradicts it")
         for id, (verdict, why) in found.items():
             self.assertEqual(verdict, claims.HOLDS, f"{id}: {why}")
 
@@ -256,7 +256,7 @@ class TestMissing(ClaimsCase):
     def open(self, lines: list[Line], ids: set[str], words: str) -> None:
         rows = self.rows(lines)
         found = {id for id, row in rows.items() if id.startswith("E") and row.verdict == claims.OPEN}
-        self.assertEqual(found, ids)
+        self.assertEqual(found, ids, "a new claim that needs what this test leaves out belongs among the ids of this test")
         for id in ids:
             self.assertIn(words, " ".join(rows[id].missing), id)
             self.assertIn("Missing: ", rows[id].why)
