@@ -74,7 +74,7 @@ export async function open(which, link = "", { width = 1440, scheme = "light", f
       history.replaceState(null, "", link || location.pathname);
       if (window.explorer) dispatchEvent(new PopStateEvent("popstate"));
       else // a report, as it is loaded
-        document.querySelectorAll("details").forEach((one) => (one.open = one.classList.contains("fold") && innerWidth > 760));
+        document.querySelectorAll("details").forEach((one) => (one.open = one.matches(".fold, #errors") && innerWidth > 760));
       scrollTo(0, 0);
     }, link);
     await drawn(page);
