@@ -400,7 +400,7 @@ class Fastest:
 
     title: str
     contestant: str
-    ms: str
+    ms: str  #: with a question mark if the machine was disturbed
     ratio: str
     sure: bool  #: the interval, or range, excludes 1
 
@@ -426,6 +426,7 @@ def lines(study: Study, every: Sequence[MeasuredCell]) -> list[Line]:
     """Returns a line for each cell, in the order of the tables: what is the fastest in it, by what is known, in ms and over the best refit."""
     order = {rows["group"].iloc[0]: place for place, rows in enumerate(study.groups())}
     total = dict(zip(map(int, study.runs["run"]), study.runs["total_motion"]))
+    disturbed = dict(zip(map(int, study.runs["run"]), study.runs["disturbed"] != ""))
     titles = dict(zip(study.runs["id"], study.runs["title"]))
     allowed = {known: advice.allowed(every, known) for known in advice.FORESIGHT}
     found = []
@@ -445,7 +446,9 @@ def lines(study: Study, every: Sequence[MeasuredCell]) -> list[Line]:
                 ends = f"{text.factor(ratio.low)}–{text.factor(ratio.high)}"
                 told += f" ({ends})" if ratio.is_interval else f" [{ends}]"
             by_knowledge.append(
-                Fastest(titles[id], cell.contestants[id], text.milliseconds(total[run]), told, ratio is not None and ratio.low > 1)
+                Fastest(
+                    titles[id], cell.contestants[id], text.milliseconds(total[run]) + "?" * disturbed[run], told, ratio is not None and ratio.low > 1
+                )
             )
         row = cell.row
         scalar = "" if row["scalar"] == "float" else f", {row['scalar']}"
