@@ -23,8 +23,8 @@ export function command(run) {
     if (builder) words.push("--builder", builder.method, "--width", builder.width, "--leaf-size", builder.leaf_size);
     words.push("--scalar", cell.scalar);
     if (!cell.continuous) words.push("--l", cell.l);
-    for (const [key, value] of Object.entries(cell.asked)) words.push(`--${key}`, ...(value === true ? [] : [quoted(value)]));
-    for (const [key, value] of Object.entries(rounds)) words.push(`--${key.replace("_", "-")}`, value);
+    for (const [key, value] of Object.entries(cell.asked)) words.push(`--${key.replaceAll("_", "-")}`, ...(value === true ? [] : [quoted(value)]));
+    for (const [key, value] of Object.entries(rounds)) words.push(`--${key.replaceAll("_", "-")}`, value);
     words.push("--oracle-every", run.every ?? 1);
     if (run.limit) words.push("--frames-limit", run.limit);
     lines.push(`${words.join(" ")} --out again`);
