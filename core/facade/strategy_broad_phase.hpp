@@ -64,8 +64,8 @@ class StrategyBroadPhase {
   void detect(CandidateKind kind, CandidateBuffer& out);
 
   /// Filter candidates as the functions of BroadPhase with these names do, until the next `build`. Throw
-  /// what those throw, and std::logic_error before `build`. The next search throws what too many rings, or the
-  /// function, throw there.
+  /// what those throw, and std::logic_error before `build`. The next search throws what too many rings, or
+  /// the function, throw there.
   void set_groups(Element element, std::span<const GroupMask> groups);
   void set_vertex_groups(std::span<const GroupMask> groups);
   void exclude(CandidateKind kind, std::span<const Candidate> pairs);
