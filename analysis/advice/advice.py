@@ -168,6 +168,7 @@ class Advice:
     faster: int = 0  #: cells in which it is faster than the best refit
     refit: str = "the best refit"  #: what it is compared with: one refit's title if that is the best one in all cells
     doubtful: list[tuple[str, float]] = field(default_factory=list)  #: cells that were measured on a disturbed machine, and their speeds
+    best_doubtful: list[str] = field(default_factory=list)  #: of a refit: those of them in which it is the best refit; `doubtful` has the others
     slower: int = 0  #: cells in which it is slower than the best refit
     unsure: int = 0  #: other cells in which the interval of its ratio contains 1, or the machine was disturbed
     why: str = ""  #: which of the two
@@ -186,11 +187,7 @@ class Advice:
             span = text.factor(self.low) + (f" to {text.factor(self.high)}" if self.low < self.high else "")
             return f"a refit, {span} times as fast as the best one of the {self.word if self.cells == 1 else self.word + 's'}{missing}{disturbed}"
         if self.baseline:
-            where = f"in the only {self.word}" if self.cells == 1 else f"in {self.best_in} of {text.plural(self.cells, self.word)}"
-            behind = "less than 1\u00a0% slower" if text.factor(self.low) == "1.00" else f"at worst {text.factor(self.low)} times as fast"
-            worst = f"; elsewhere {behind}" if self.best_in < self.cells else ""
-            equal = f" ({text.listing(self.equals)} {'is' if len(self.equals) == 1 else 'are'} as fast, within the 95\u00a0% interval)" if self.equals else ""
-            return f"the best refit {where}{worst}{missing}{equal}{disturbed}"
+            return self._says_of_refit(missing)
         span = f"{text.factor(self.low)} to {text.factor(self.high)}" if self.low < self.high else ""
         of = f"in {text.plural(self.cells, self.word)}"
         if span and self.cells == 1:
@@ -205,15 +202,29 @@ class Advice:
         mean = " on average" if self.cells > 1 else ""
         return f"{text.factor(self.speed)} times as fast as {self.refit}{mean} ({of}{missing}{doubt})"
 
+    def _says_of_refit(self, missing: str) -> str:
+        """Writes in how many cells it is the best refit and how far behind it is in the others, each with what is doubtful there."""
+        equal = f" ({text.listing(self.equals)} {'is' if len(self.equals) == 1 else 'are'} as fast, within the 95\u00a0% interval)" if self.equals else ""
+        if self.cells == 1:
+            doubt = f" ({self._doubt(())})" if self.disturbed else ""
+            return f"the best refit in the only {self.word}{missing}{equal}{doubt}"
+        said = f"the best refit in {self.best_in} of {text.plural(self.cells, self.word)}{missing}{equal}"
+        if self.best_doubtful:
+            said += f" (doubtful, from a disturbed machine: {_first_two(self.best_doubtful)})"
+        others = self.measured - self.best_in
+        if not others:
+            return said
+        behind = "less than 1\u00a0% slower" if text.factor(self.low) == "1.00" else f"{'at worst ' * (others > 1)}{text.factor(self.low)} times as fast"
+        doubt = f" ({self._doubt(self.doubtful)})" if self.doubtful else ""
+        return f"{said}; in the other {'one' if others == 1 else others} {behind}{doubt}"
+
     def _doubt(self, doubtful: Sequence[tuple[str, float]]) -> str:
         """Names ratios that a disturbed machine makes doubtful, each with its cell."""
         if not self.disturbed:
             return ""
         if self.cells == 1 or not doubtful:
             return "a doubtful run: the machine was disturbed"
-        named = [f"{text.factor(speed)} on {title}" for title, speed in doubtful[:2]]
-        more = f" and {len(doubtful) - 2} more" if len(doubtful) > 2 else ""
-        return f"doubtful, from a disturbed machine: {', '.join(named)}{more}"
+        return f"doubtful, from a disturbed machine: {_first_two([f'{text.factor(speed)} on {title}' for title, speed in doubtful])}"
 
     @property
     def sure(self) -> str:
@@ -238,12 +249,16 @@ class Advice:
         first, last = (f"{one}, " if one else "" for one in self.at)
         return f"{low} ms ({first}{small}) to {high} ms ({last}{large} triangles) a frame"
 
-
     @property
     def rates(self) -> str:
         """Writes the times per primitive out, as in "2.3 to 17 ns a triangle": for sizes between those that were measured. "" of a single cell."""
         low, high = (text.significant(one, 2) for one in self.per_primitive)
         return f"{low} to {high} ns a triangle" if self.measured > 1 and low != high else ""
+
+
+def _first_two(named: Sequence[str]) -> str:
+    """Lists two names and counts the others: names contain commas."""
+    return "; ".join(named[:2]) + (f"; and {len(named) - 2} more" if len(named) > 2 else "")
 
 
 def lost(one: Advice) -> str:
@@ -383,7 +398,8 @@ def advise(own: Sequence[Cell], known: str) -> Optional[Advice]:
         times=(ends[0].times[best], ends[1].times[best]), sizes=(ends[0].primitives, ends[1].primitives),
         word="scene" if len(scenes) == len(own) else "cell", faster=sum(cell.speeds[best] > 1 for cell in measured),
         refit=f"the {measured[0].facts[one_refit].title}" if one_refit in measured[0].facts else "the best refit",
-        doubtful=[(cell.title, cell.speeds[best]) for cell in measured if best in cell.doubtful],
+        doubtful=[(cell.title, cell.speeds[best]) for cell in measured if best in cell.doubtful and cell.best_refit != best],
+        best_doubtful=[cell.title for cell in measured if best in cell.doubtful and cell.best_refit == best],
         slower=sum(cell.speeds[best] < 1 for cell in measured), unsure=len(unsure), why=" or ".join(dict.fromkeys(unsure)),
         at=(ends[0].title.split(", ")[0], ends[1].title.split(", ")[0]) if len(scenes) > 1 else ("", ""),
         losses=sorted(((cell.title, cell.speeds[best]) for cell in measured if cell.speeds[best] < 1), key=lambda one: one[1]),

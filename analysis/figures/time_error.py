@@ -216,16 +216,14 @@ def sentences(study: Study, place: Place) -> list[str]:
             one = f"{few.name} takes {text.milliseconds(few.time)}\u00a0ms a frame and {wrong}"
             other = f"the fastest exact one, {exact.name}, takes {text.milliseconds(exact.time)}\u00a0ms a frame"
             wins = few.time < exact.time
-            times = _times_as_fast(study, few, exact) if wins else _times_as_fast(study, exact, few)
+            times = _times_as_fast(study, few, exact, f"), {NO_GAIN}") if wins else _times_as_fast(study, exact, few, f"; {NOT_APART})")
             says += f"{allowing}makes a frame {times}: {one}; {other}." if wins else f"{allowing}gains nothing: {other} and is {times} as the fastest with errors ({one})."
         told[exact.contestant, few.contestant if few else ""] = says
     return list(told.values())
 
 
-#: What makes a sentence's number doubtful.
-NOT_APART, DISTURBED = "this run does not tell them apart", "a doubtful run: the machine was disturbed"
-#: The same in short.
-DOUBTS = {NOT_APART: "not told apart", DISTURBED: "a doubtful run"}
+#: What makes a sentence's number doubtful: of a gain; of a loss; of both.
+NO_GAIN, NOT_APART, DISTURBED = "which may be no gain", "this run does not tell them apart", "a doubtful run: the machine was disturbed"
 
 
 def brief(place: Place) -> str:
@@ -240,22 +238,27 @@ def brief(place: Place) -> str:
         return f"No exact contestant was measured where one answers wrongly ({where})."
     if few is None:
         return f"No approximate contestant missed less than {allowed} of the pairs{known}; the exact {exact.title} takes {text.milliseconds(exact.time)} ms ({where})."
-    doubt = next((f", {brief}" for whole, brief in DOUBTS.items() if place.sentences and whole in place.sentences[0]), "")
-    times = text.factor(max(exact.time, few.time) / min(exact.time, few.time))
-    buys = f"makes a frame {times} times as fast{known}" if few.time < exact.time else f"gains nothing{known}"
+    said = place.sentences[0] if place.sentences else ""
+    doubt = ", a doubtful run" if DISTURBED in said else ""
+    if few.time < exact.time:
+        span = re.search(r"times as fast \(([^;)]+ to [^;)]+)", said) if NO_GAIN in said else None
+        gain = f" ({span[1]}, {NO_GAIN})" if span else ""
+        buys = f"makes a frame {text.factor(exact.time / few.time)} times as fast{gain}{known}"
+    else:
+        buys = f"makes no difference that is sure{known}" if NOT_APART in said else f"gains nothing{known}"
     return (
         f"Missing up to {allowed} of the pairs {buys}: {text.milliseconds(few.time)} ms by {few.title}, "
         f"{text.milliseconds(exact.time)} ms exactly by {exact.title} ({where}{doubt})."
     )
 
 
-def _times_as_fast(study: Study, quick: Point, slow: Point) -> str:
-    """Writes how many times as fast the first is, with the interval and what makes the number doubtful."""
+def _times_as_fast(study: Study, quick: Point, slow: Point, not_apart: str) -> str:
+    """Writes how many times as fast the first is, with the interval; ends with `not_apart` instead of ")" if the interval does not lie above 1."""
     found = ratios.ratio(study, quick.run, slow.run, "with_motion")
     doubts = [f"{text.factor(found.low)} to {text.factor(found.high)}"] if found and found.low < found.high else []
     doubts += [DISTURBED] if found and found.disturbed else []
-    doubts += [] if found is None or found.low > 1 else [NOT_APART]
-    return f"{text.factor(slow.time / quick.time)} times as fast" + (f" ({'; '.join(doubts)})" if doubts else "")
+    end = ")" if found is None or found.low > 1 else not_apart
+    return f"{text.factor(slow.time / quick.time)} times as fast" + (f" ({'; '.join(doubts)}{end}" if doubts else "")
 
 
 def finding(place: Place, name: str) -> str:

@@ -54,7 +54,7 @@ class StrategyBroadPhase {
              double radius = 0) {
     start(v0, v1, make_elements(v0.rows, view_of(e), view_of(f)), radius);
   }
-  /// Takes other positions of the same mesh, or another motion. O(n).
+  /// Takes other positions of the same mesh, or another motion. O(n). Throws std::logic_error before `build`.
   void update(const MatrixView<S>& v) { take(v, v); }
   void update(const MatrixView<S>& v0, const MatrixView<S>& v1) { take(v0, v1); }
 
@@ -63,13 +63,15 @@ class StrategyBroadPhase {
   /// if the strategy does not suit, and std::logic_error before `build`.
   void detect(CandidateKind kind, CandidateBuffer& out);
 
-  /// Filter candidates as the functions of BroadPhase with these names do, until the next `build`. Throw as
-  /// those do, and std::logic_error before `build`; the next search throws what their functions throw.
+  /// Filter candidates as the functions of BroadPhase with these names do, until the next `build`. Throw
+  /// what those throw, and std::logic_error before `build`. The next search throws what too many rings, or
+  /// the function, throw there.
   void set_groups(Element element, std::span<const GroupMask> groups);
   void set_vertex_groups(std::span<const GroupMask> groups);
   void exclude(CandidateKind kind, std::span<const Candidate> pairs);
   void exclude_rings(std::uint32_t rings);
   void keep_only(PairFunction function);
+  /// Ends all filters. Before `build` there are none, and nothing is thrown.
   void clear_filters();
 
   const std::string& strategy() const { return strategy_; }

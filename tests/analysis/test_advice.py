@@ -142,12 +142,25 @@ class TestRule(unittest.TestCase):
             one["strategy"].update(baseline=True)
         best = taken(lines)[0]
         self.assertEqual(best.id, "lazy")
-        self.assertEqual(best.says, "the best refit in 1 of 3 scenes; elsewhere at worst 0.91 times as fast")
+        self.assertEqual(best.says, "the best refit in 1 of 3 scenes; in the other 2 at worst 0.91 times as fast")
         for one in lines[3:5]:
             one["times"] = line("lazy", 1.004)["times"]
-        self.assertEqual(taken(lines)[0].says, "the best refit in 1 of 3 scenes; elsewhere less than 1\u00a0% slower")
+        self.assertEqual(taken(lines)[0].says, "the best refit in 1 of 3 scenes; in the other 2 less than 1\u00a0% slower")
+
+    def test_doubt_of_a_refit_stands_where_it_is_the_best_one_or_with_the_others(self) -> None:
+        lines = [line("refit", 1.0, "a"), line("refit", 2.0, "b"), line("refit", 2.0, "c"),
+                 line("lazy", 1.1, "a"), line("lazy", 1.0, "b"), line("lazy", 1.0, "c")]  # fmt: skip
+        for one in lines:
+            one["strategy"].update(baseline=True)
+        self.assertEqual(taken(lines)[0].says, "the best refit in 2 of 3 scenes; in the other one 0.91 times as fast")
         lines[-1]["times"]["disturbed"] = "9 involuntary switches"
-        self.assertTrue(taken(lines)[0].says.endswith("slower (doubtful, from a disturbed machine: 1.00 on c, 4k, l = 10)"))
+        disturbed = "doubtful, from a disturbed machine: "
+        self.assertEqual(taken(lines)[0].says, f"the best refit in 2 of 3 scenes ({disturbed}c, 4k, l = 10); in the other one 0.91 times as fast")
+        lines[3]["times"]["disturbed"] = "9 involuntary switches"
+        self.assertEqual(taken(lines)[0].says, f"the best refit in 2 of 3 scenes ({disturbed}c, 4k, l = 10); in the other one 0.91 times as fast ({disturbed}0.91 on a, 4k, l = 10)")
+        self.assertEqual(taken(lines[2:3] + lines[5:])[0].says, "the best refit in the only scene (a doubtful run: the machine was disturbed)")
+        picky = [*lines[:3], *lines[4:], *(line(id, 3.0, scene) for id in ("x",) for scene in "abc")]
+        self.assertEqual(taken(picky)[0].says, f"the best refit in 2 of 3 scenes, measured in 2 ({disturbed}c, 4k, l = 10)")
 
     def test_it_says_in_words_whether_a_strategy_is_surely_faster(self) -> None:
         facts = {"refit": advice.Facts("refit", "none", True), "join": advice.Facts("join", "none", False)}

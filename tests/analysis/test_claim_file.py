@@ -127,6 +127,28 @@ class TestForm(unittest.TestCase):
             self.assertIn(f"`{word}`", section)
 
 
+class TestPages(unittest.TestCase):
+    def test_pages_that_count_the_claims_count_those_of_the_file(self) -> None:
+        words = "zero one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen sixteen seventeen eighteen nineteen twenty".split()
+        said = claims.read_claims()
+        ids = [one["id"] for one in (*said["claims"], *said["theory"])]
+        last = {kind: sum(id.startswith(kind) for id in ids) for kind in "ETC"}
+        self.assertEqual(ids, [f"{kind}{i + 1}" for kind, count in last.items() for i in range(count)], "numbered without a gap")
+        e, t, c = (f"{kind}1 to {kind}{count}" for kind, count in last.items())
+        many = {kind: words[count] for kind, count in last.items()}
+        for page, told in (
+            ("analysis/guides/results.md", (f"{many['E']} experimental claims, {e} (", f"{many['T']} claims, {t}, each", f"{many['C'].title()} more claims, {c},")),
+            ("analysis/lessons/text/4-kinetic-tree.md", (f"theoretical claims from {t};",)),
+            ("analysis/advice/summary.py", (f"{e}, then {t}, then {c}",)),
+            ("experiments/RESULTS.md", (f"checks the claims {t} of", f"arithmetic, and {c}, what", f"claims {t} and {c} are taken")),
+            ("experiments/plans/paper.json", (f"for the claims {e} and",)),
+            ("experiments/theory/theory.hpp", (f"{t}, {c}",)),
+        ):  # fmt: skip
+            text = " ".join((paths.HERE.parents[1] / page).read_text(encoding="utf-8").split())
+            for one in told:
+                self.assertIn(one, text, page)
+
+
 class TestNewClaim(unittest.TestCase):
     def test_a_claim_that_something_is_nowhere_above_zero(self) -> None:
         # Its picture would have nothing but zeros on a logarithmic axis.

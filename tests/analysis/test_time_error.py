@@ -101,6 +101,21 @@ class TestTimeError(unittest.TestCase):
         (place,) = time_error.places(study)
         self.assertIn("no approximate contestant missed less than 1\u00a0%", time_error.sentences(study, place)[0])
 
+    def test_a_gain_within_the_noise_may_be_none(self) -> None:
+        def rounds(one: dict[str, Any], updates: list[float]) -> dict[str, Any]:
+            one["times"]["repetitions"] = [{**one["times"]["repetitions"][0], "update": update} for update in updates]
+            return one
+
+        high, low = [2.0, 2.04, 2.0], [1.98, 2.06, 1.94]  # ratios 1.01, 0.99 and 1.03
+        study = self.study([rounds(exact("refit", 2.0), high), rounds(wrong("good", 2.0, 1), low)])
+        (place,) = time_error.places(study)
+        self.assertIn("makes a frame 1.01 times as fast (0.99 to 1.03), which may be no gain: good takes", time_error.sentences(study, place)[0])
+        self.assertIn("makes a frame 1.01 times as fast (0.99 to 1.03, which may be no gain) if nothing is known: ", time_error.brief(place))
+        study = self.study([rounds(exact("refit", 2.0), low), rounds(wrong("good", 2.0, 1), high)])
+        (place,) = time_error.places(study)
+        self.assertRegex(time_error.sentences(study, place)[0], r"gains nothing: .* is 1\.01 times as fast \(0\.99 to 1\.03; this run does not tell them apart\) as")
+        self.assertIn("makes no difference that is sure if nothing is known: ", time_error.brief(place))
+
     def test_knowledge_of_the_future_is_compared_with_its_like(self) -> None:
         lines = [exact("refit", 2.0), exact("clip", 0.8, foresight="whole_clip"), wrong("good", 1.0, 1)]
         study = self.study(lines)
@@ -249,8 +264,9 @@ class TestTimeError(unittest.TestCase):
             time_error.brief(place),
             "Missing up to 1\u00a0% of the pairs makes a frame 2.00 times as fast if nothing is known: 1.00 ms by good, 2.00 ms exactly by refit (cloth, 4k triangles).",
         )
-        place.sentences[0] = place.sentences[0].replace("times as fast", f"times as fast ({time_error.NOT_APART})", 1)
-        self.assertTrue(time_error.brief(place).endswith("(cloth, 4k triangles, not told apart)."))
+        place.sentences[0] = place.sentences[0].replace("times as fast", f"times as fast (0.90 to 2.20; {time_error.DISTURBED}), {time_error.NO_GAIN}", 1)
+        self.assertIn("makes a frame 2.00 times as fast (0.90 to 2.20, which may be no gain) if nothing is known: 1.00 ms", time_error.brief(place))
+        self.assertTrue(time_error.brief(place).endswith("(cloth, 4k triangles, a doubtful run)."))
         for lines, said in (
             ([exact("refit", 1.0), wrong("good", 1.5, 1)], "gains nothing if nothing is known: 1.50 ms by good, 1.00 ms exactly by refit"),
             ([exact("refit", 1.0), wrong("bad", 0.5, 500)], "No approximate contestant missed less than 1\u00a0% of the pairs if nothing is known; the exact refit takes 1.00 ms"),

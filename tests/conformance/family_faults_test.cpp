@@ -1,6 +1,7 @@
 // The suite can fail for the families beyond refits: linear bounds, the interval join with its span filter,
-// near pairs, sweeps of contacts, trees built at every frame and the sweep on one axis, each in its simplest
-// form, without a fault and with one seeded fault. (faults_test.cpp: the others.)
+// near pairs, trees built at every frame and the sweep on one axis, each in its simplest form, without a
+// fault and with one seeded fault. (faults_test.cpp: the others; contact_faults_test.cpp: sweeps of
+// contacts.)
 
 #include <gtest/gtest.h>
 
@@ -28,7 +29,6 @@ enum class Fault : std::uint8_t {
   overdue_verdict,  // a verdict at the segment's begin is reported throughout
   small_closing,    // bodies are assumed to close in by a tenth of the bound
   stale_rows,       // a search reads the leaves of the previous search
-  ends_only,        // a sweep considers only the end of the motion
   lost_primitive,   // a sort loses a primitive and repeats another one
   short_leaf,       // a leaf ends one primitive early
   unmade_tree,      // every eighth tree is not built: the previous one stays in use
@@ -249,26 +249,6 @@ class Near : public StoredHierarchyStrategy<S>, public AnswersSelfPairs {
   std::vector<double> moved_;
 };
 
-/// A refit that answers sweeps by boxes over both ends of the motion.
-template <class S, Fault fault>
-class Sweep : public StoredHierarchyStrategy<S>, public AnswersSweeps<S> {
-  using Base = StoredHierarchyStrategy<S>;
-
- public:
-  static constexpr Foresight foresight = Foresight::none;
-  using Base::Base;
-
- private:
-  void update(std::uint32_t body) override { this->refit(body); }
-  void find_swept_pairs(double /*t0*/, double /*t1*/, std::span<const S* const> before,
-                        PairBuffer& out) override {
-    std::vector<const S*> from(before.begin(), before.end());
-    if (fault == Fault::ends_only)
-      for (std::uint32_t body = 0; body < from.size(); ++body) from[body] = this->sampled_.positions(body);
-    this->sweep(from, out);
-  }
-};
-
 /// Splits ranges in the middle.
 struct Halves {
   using Part = KeyRange;
@@ -476,43 +456,6 @@ TEST(FamilyFaults, SweptOnAnotherAxisThanSorted) {
 }
 TEST(FamilyFaults, SweptBoxesOfTheFirstFrame) {
   expect_caught<AxisSweep, Fault::unmade_boxes>("soups", "not among the candidates");
-}
-
-/// Contacts that a strategy's sweeps miss on a scene.
-template <class S, Fault fault>
-std::size_t missed_contacts(const char* name) {
-  const auto test = synthetic_scene<S>(name);
-  const StrategyEntry entry = entry_of<Sweep, fault>();
-  Session<S> session(test.scene, {&entry, {}, entry.info.topology.preferred});
-  ContactFinder<S> finder(test.scene);
-  Playback<S> playback(test.scene);
-  const std::vector<double> knots = overlaid_keyframes(test.scene);
-  PhaseTimes ignored;
-  std::size_t missed = 0;
-  session.reset(knots[0]);
-  for (std::size_t k = 0; k + 1 < knots.size(); ++k) {
-    playback.seek(knots[k]);
-    playback.evaluate_all();
-    finder.start(playback);
-    playback.seek(knots[k + 1]);
-    playback.evaluate_all();
-    ContactBuffer truth, found;
-    finder.find_all(playback, truth);
-    session.contacts(knots[k + 1], found, ignored);
-    std::sort(truth.begin(), truth.end());
-    std::sort(found.begin(), found.end());
-    for (const Contact& contact : truth)
-      missed += std::binary_search(found.begin(), found.end(), contact) ? 0 : 1;
-  }
-  return missed;
-}
-TEST(FamilyFaults, SoundSweepsPass) {
-  EXPECT_EQ((missed_contacts<float, Fault::none>("soups")), 0u);
-  EXPECT_EQ((missed_contacts<double, Fault::none>("soups")), 0u);
-}
-TEST(FamilyFaults, SweepsOfTheEndOnly) {
-  EXPECT_GT((missed_contacts<float, Fault::ends_only>("soups")), 0u);
-  EXPECT_GT((missed_contacts<double, Fault::ends_only>("soups")), 0u);
 }
 
 }  // namespace

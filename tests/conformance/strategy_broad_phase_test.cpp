@@ -177,7 +177,6 @@ TYPED_TEST(StrategiesAsBroadPhases, FilterAsBroadPhaseDoes) {
   EXPECT_THROW(broad.set_groups(Element::face, of_vertices), std::invalid_argument);
   EXPECT_THROW(broad.exclude(CandidateKind::edge_edge, std::vector<Candidate>{{0, 1u << 20}}),
                std::invalid_argument);
-  EXPECT_THROW(StrategyBroadPhase<S>("bottom_up").exclude_rings(1), std::logic_error);
 }
 
 /// Seeded fault: a mesh whose radius is forgotten, or whose motion is.
@@ -201,6 +200,12 @@ TEST(StrategyBroadPhases, SayWhatTheyCannotDo) {
   StrategyBroadPhase<float> early("bottom_up");
   EXPECT_THROW(early.detect(CandidateKind::edge_edge, found), std::logic_error);
   EXPECT_THROW(early.update(mesh.begin()), std::logic_error);
+  EXPECT_THROW(early.set_groups(Element::face, {}), std::logic_error);
+  EXPECT_THROW(early.set_vertex_groups({}), std::logic_error);
+  EXPECT_THROW(early.exclude(CandidateKind::edge_edge, {}), std::logic_error);
+  EXPECT_THROW(early.exclude_rings(1), std::logic_error);
+  EXPECT_THROW(early.keep_only({}), std::logic_error);
+  EXPECT_NO_THROW(early.clear_filters());
   const auto refusal = [&](const char* id, CandidateKind kind) {
     StrategyBroadPhase<float> broad(id);
     build(broad, mesh, 0.1f);

@@ -105,7 +105,7 @@ export function ranked(model, cells, known) {
     one.bestIn = one.own.filter(({ refit, runs }) => runs.get(one.id) === refit).length;
     one.doubtful = one.own
       .filter(({ refit, runs }) => runs.get(one.id).disturbed || refit.disturbed)
-      .map(({ cell, speeds }) => ({ cell, speed: speeds.get(one.id) }));
+      .map(({ cell, refit, runs, speeds }) => ({ cell, speed: speeds.get(one.id), isBest: runs.get(one.id) === refit }));
     one.disturbed = one.doubtful.length > 0;
   }
   return found;
@@ -138,7 +138,7 @@ export function rankedKept(kept, cells, known) {
       ...{ id, contestant: { title, baseline }, low, high: Math.max(...speeds), own, cells: cells.length },
       speed: geometricMean([...speeds, ...Array(cells.length - own.length).fill(low)]),
       bestIn: own.filter((cell) => cell.refit === id).length,
-      doubtful: own.filter((cell) => cell.doubtful.includes(id)).map((cell) => ({ cell, speed: cell.speeds[id] })),
+      doubtful: own.filter((cell) => cell.doubtful.includes(id)).map((cell) => ({ cell, speed: cell.speeds[id], isBest: cell.refit === id })),
       disturbed: own.some((cell) => cell.doubtful.includes(id)),
     });
   }

@@ -175,6 +175,20 @@ await check("four questions are answered by a name, an interval and a curve", as
   leave(page);
 });
 
+await check("where a refit is the best one, doubtful cells are named without their ratio to itself", async () => {
+  const page = await load("reference");
+  const told = await page.evaluate(() => {
+    const { model, set } = window.explorer;
+    for (const { refit } of model.counted) refit.disturbed = "by this check";
+    set({ know: "none", frames: "1", large: "any" });
+    return document.querySelector(".answer").textContent;
+  });
+  const doubts = [...told.matchAll(/the best refit in \d+ of \d+ cells(.{60})/g)].map(([, next]) => next);
+  assert.ok(doubts.length > 0, told);
+  for (const next of doubts) assert.match(next, /^(, measured in \d+)? \(doubtful, from a disturbed machine: (?![\d.]+ on )/);
+  await page.close();
+});
+
 const pressed = (page) => page.$$eval('.segments [aria-pressed="true"]', (list) => list.map((one) => one.textContent));
 const press = (page, text) =>
   page.evaluate((text) => [...document.querySelectorAll(".segments button")].find((one) => one.textContent === text).click(), text);

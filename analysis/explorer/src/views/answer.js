@@ -144,23 +144,30 @@ export function speedText(one) {
     const span = one.low < one.high ? `${factor(one.low)} to ${factor(one.high)}` : factor(one.low);
     return `a refit, ${span} times as fast as the best one of the ${one.cells === 1 ? "cell" : "cells"}${missing}${disturbed}`;
   }
-  if (one.contestant.baseline) {
-    const where = one.cells === 1 ? "in the only cell" : `in ${one.bestIn} of ${plural(one.cells, "cell")}`;
-    const behind = factor(one.low) === "1.00" ? "less than 1\u00a0% slower" : `at worst ${factor(one.low)} times as fast`;
-    return `the best refit ${where}${one.bestIn < one.cells ? `; elsewhere ${behind}` : ""}${missing}${disturbed}`;
-  }
+  if (one.contestant.baseline) return refitText(one, missing);
   const span = one.low < one.high ? `${factor(one.low)} to ${factor(one.high)}` : "";
   const kind = one.isInterval ? "95\u00a0% interval" : "range of its rounds";
   const of = span && one.cells === 1 ? `${kind} ${span}` : `${span} in ${plural(one.cells, "cell")}`.trim();
   return `${factor(one.speed)} times as fast as the best refit (${of}${missing}${one.disturbed ? `; ${doubtText(one)}` : ""})`;
 }
 
-/** Names the ratios that were measured on a disturbed machine, each next to its number. */
+/** Tells in how many cells a refit is the best one and how far behind it is in the others, each with what is doubtful there. */
+function refitText(one, missing) {
+  if (one.cells === 1) return `the best refit in the only cell${missing}${one.disturbed ? ` (${doubtText(one)})` : ""}`;
+  const [best, behind] = [true, false].map((isBest) => one.doubtful.filter((cell) => cell.isBest === isBest));
+  const said = `the best refit in ${one.bestIn} of ${plural(one.cells, "cell")}${missing}${best.length ? ` (${doubtText({ ...one, doubtful: best })})` : ""}`;
+  const others = one.own.length - one.bestIn;
+  if (!others) return said;
+  const times = factor(one.low) === "1.00" ? "less than 1\u00a0% slower" : `${others > 1 ? "at worst " : ""}${factor(one.low)} times as fast`;
+  return `${said}; in the other ${others === 1 ? "one" : others} ${times}${behind.length ? ` (${doubtText({ ...one, doubtful: behind })})` : ""}`;
+}
+
+/** Names the cells that were measured on a disturbed machine: with its ratio, or by itself where it is the best refit. */
 function doubtText({ doubtful, cells }) {
   if (cells === 1) return "a doubtful run: the machine was disturbed";
-  const named = doubtful.slice(0, 2).map(({ cell, speed }) => `${factor(speed)} on ${cell.shown ?? cell.title}`);
-  const more = doubtful.length > 2 ? ` and ${doubtful.length - 2} more` : "";
-  return `doubtful, from a disturbed machine: ${named.join(", ")}${more}`;
+  const named = doubtful.slice(0, 2).map(({ cell, speed, isBest }) => `${isBest ? "" : `${factor(speed)} on `}${cell.shown ?? cell.title}`);
+  const more = doubtful.length > 2 ? `; and ${doubtful.length - 2} more` : "";
+  return `doubtful, from a disturbed machine: ${named.join("; ")}${more}`;
 }
 
 /** Answers in words whether a strategy is surely faster than the best refit: by the cells in which it loses, or may lose. "" of a refit. */

@@ -184,10 +184,11 @@ function bargain(model, runs, known) {
   const ratio = wins ? compare(model, few, exact, "with_motion") : compare(model, exact, few, "with_motion");
   const ends = [
     ratio.low < ratio.high && `${factor(ratio.low)} to ${factor(ratio.high)}`,
-    ratio.low <= 1 && "this run does not tell them apart",
     ratio.disturbed && "a doubtful run: the machine was disturbed",
+    ratio.low <= 1 && !wins && "this run does not tell them apart",
   ].filter(Boolean);
-  const times = `${factor(ratio.middle)} times as fast${ends.length ? ` (${ends.join("; ")})` : ""}`;
+  const doubt = ratio.low <= 1 && wins ? ", which may be no gain" : "";
+  const times = `${factor(ratio.middle)} times as fast${ends.length ? ` (${ends.join("; ")})` : ""}${doubt}`;
   const one = `${few.contestant.label} takes ${ms(few)} and missed ${few.missed ? percent(missedShare(few)) : "nothing here, but promises nothing"}`;
   const other = `the fastest exact one, ${exact.contestant.title}, takes ${ms(exact)}`;
   return (
