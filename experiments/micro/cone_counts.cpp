@@ -1,5 +1,5 @@
 // Counts what the certificates of patches take (core/adr/0017-broad-phase-of-a-simulator.md, Cones) on linear
-// segments of l frames: anew at each frame, with the failure of a certificate as an event, and by bisection.
+// segments of l frames: at each frame, with the failure of a certificate as an event, and by bisection.
 // Runs no clock: repeated runs give equal counts. Prints two Markdown tables, of which the first is that of
 // the ADR.
 //   kbvh_cone_counts [SIDE]
@@ -45,29 +45,28 @@ Row count_scene(const char* scene, std::uint32_t side, const std::vector<double>
 
 void print_summary(const std::vector<Row>& rows) {
   std::printf(
-      "| scene | l | anew | events | events / anew | roots | failures | bisected | bisected / anew | "
-      "certified "
-      "faces: anew, events, bisected |\n|---|--:|--:|--:|--:|--:|--:|--:|--:|---|\n");
+      "| scene | l | each frame | events | events / each frame | roots | failures | bisected | bisected / "
+      "each frame | certified faces: each frame, events, bisected "
+      "|\n|---|--:|--:|--:|--:|--:|--:|--:|--:|---|\n");
   for (const Row& row : rows) {
     const ConeWays& ways = row.ways;
-    const auto anew = double(ways.anew.determinants);
+    const auto each_frame = double(ways.each_frame.determinants);
     std::printf("| %s | %d | %.0f | %.0f | %.2f | %.0f | %.0f | %.0f | %.2f | %.1f %%, %.1f %%, %.1f %% |\n",
-                row.scene, row.frames, row.thousands(ways.anew.determinants),
-                row.thousands(ways.events.determinants), double(ways.events.determinants) / anew,
+                row.scene, row.frames, row.thousands(ways.each_frame.determinants),
+                row.thousands(ways.events.determinants), double(ways.events.determinants) / each_frame,
                 row.per_segment(ways.events.roots), row.per_segment(ways.events.failures),
-                row.thousands(ways.bisected.determinants), double(ways.bisected.determinants) / anew,
-                row.certified(ways.anew), row.certified(ways.events), row.certified(ways.bisected));
+                row.thousands(ways.bisected.determinants), double(ways.bisected.determinants) / each_frame,
+                row.certified(ways.each_frame), row.certified(ways.events), row.certified(ways.bisected));
   }
 }
 
 void print_details(const std::vector<Row>& rows) {
   std::printf(
       "| scene | l | way | patches looked at | signs, thousands | determinants, thousands | certified "
-      "patches "
-      "per frame |\n|---|--:|---|--:|--:|--:|--:|\n");
+      "patches per frame |\n|---|--:|---|--:|--:|--:|--:|\n");
   for (const Row& row : rows) {
-    const ConeCounts* const ways[] = {&row.ways.anew, &row.ways.events, &row.ways.bisected};
-    const char* const names[] = {"anew", "events", "bisected"};
+    const ConeCounts* const ways[] = {&row.ways.each_frame, &row.ways.events, &row.ways.bisected};
+    const char* const names[] = {"each frame", "events", "bisected"};
     for (int i = 0; i < 3; ++i)
       std::printf("| %s | %d | %s | %.0f | %.1f | %.1f | %.1f |\n", row.scene, row.frames, names[i],
                   row.per_segment(ways[i]->patches), row.thousands(ways[i]->signs),

@@ -1,5 +1,5 @@
 #pragma once
-// Three ways to the certificates of patches at the frames of a linear segment, counted: anew at each frame,
+// Three ways to the certificates of patches at the frames of a linear segment, counted: at each frame,
 // by events at the failures of certificates, and by bisection of the segment.
 #include <algorithm>
 #include <array>
@@ -27,9 +27,9 @@ inline void add_work(const PatchCertificate<double>::Work& work, ConeCounts& cou
   counts.determinants += work.determinants;
 }
 
-/// Certifies anew at each frame, as BroadPhase::self_intersections does: from the root down, each patch up to
-/// its first wrong sign.
-inline void count_anew(const PatchTree& patches, const FramePositions& positions, ConeCounts& counts) {
+/// Certifies again at each frame, as BroadPhase::self_intersections does: from the root down, each patch up
+/// to its first wrong sign.
+inline void count_each_frame(const PatchTree& patches, const FramePositions& positions, ConeCounts& counts) {
   PatchCulling<double> culling;
   for (const std::vector<double>& points : positions) {
     culling.run(patches.leaves(), patches.padded(), patches.contours(), points.data(), nullptr);
@@ -134,13 +134,13 @@ inline void count_events(const PatchTree& patches, const ClothSegment& segment, 
 
 /// The counts of all three ways.
 struct ConeWays {
-  ConeCounts anew, events, bisected;
+  ConeCounts each_frame, events, bisected;
 };
 
 /// Counts one segment of l frames.
 inline void count_cones(const PatchTree& patches, const ClothSegment& segment, int frames, ConeWays& ways) {
   const FramePositions positions = frame_positions(segment, frames);
-  count_anew(patches, positions, ways.anew);
+  count_each_frame(patches, positions, ways.each_frame);
   count_events(patches, segment, frames, ways.events);
   BisectedCones(patches, positions).add_to(ways.bisected);
 }

@@ -52,14 +52,14 @@ TEST(ConeCounts, OneFrameSavesNothing) {
   int compared = 0;
   for_cases([&](const Case& of) {
     const ConeWays ways = of.count(1);
-    EXPECT_GT(ways.anew.determinants, 0u) << of.what;
-    EXPECT_EQ(ways.bisected.determinants, ways.anew.determinants) << of.what;
-    EXPECT_EQ(ways.bisected.signs, ways.anew.signs) << of.what;
-    EXPECT_EQ(ways.bisected.patches, ways.anew.patches) << of.what;
-    EXPECT_EQ(ways.bisected.certified_faces, ways.anew.certified_faces) << of.what;
-    if (ways.events.certified_faces < ways.anew.certified_faces) return;
+    EXPECT_GT(ways.each_frame.determinants, 0u) << of.what;
+    EXPECT_EQ(ways.bisected.determinants, ways.each_frame.determinants) << of.what;
+    EXPECT_EQ(ways.bisected.signs, ways.each_frame.signs) << of.what;
+    EXPECT_EQ(ways.bisected.patches, ways.each_frame.patches) << of.what;
+    EXPECT_EQ(ways.bisected.certified_faces, ways.each_frame.certified_faces) << of.what;
+    if (ways.events.certified_faces < ways.each_frame.certified_faces) return;
     ++compared;
-    EXPECT_GE(ways.events.determinants, ways.anew.determinants) << of.what;
+    EXPECT_GE(ways.events.determinants, ways.each_frame.determinants) << of.what;
   });
   EXPECT_GE(compared, 2);
 }
@@ -71,9 +71,9 @@ TEST(ConeCounts, AFlatClothAtRestNeverFails) {
       const ConeWays ways = of.count(frames);
       EXPECT_EQ(ways.events.failures, 0u);
       EXPECT_EQ(ways.events.roots, 0u);
-      EXPECT_EQ(ways.anew.patches, std::uint64_t(frames));
+      EXPECT_EQ(ways.each_frame.patches, std::uint64_t(frames));
       for (const ConeCounts* const counts : {&ways.events, &ways.bisected}) EXPECT_EQ(counts->patches, 1u);
-      for (const ConeCounts* const counts : {&ways.anew, &ways.events, &ways.bisected})
+      for (const ConeCounts* const counts : {&ways.each_frame, &ways.events, &ways.bisected})
         EXPECT_EQ(counts->certified_faces, of.faces * std::uint64_t(frames));
     }
   }
