@@ -62,8 +62,8 @@ std::vector<Vector3> resampled(std::span<const Vector3> line, std::size_t count)
 }
 
 /// Returns the largest diameter of a rope along this line that neither touches itself nor bends more sharply
-/// than its radius: the smallest distance between parts that are a tenth of the length apart or more, or twice
-/// the smallest radius of curvature.
+/// than its radius: the smallest distance between parts that are a tenth of the length apart or more, or
+/// twice the smallest radius of curvature.
 double room_of(std::span<const Vector3> line) {
   double least = std::numeric_limits<double>::infinity();
   const std::size_t apart = line.size() / 10;

@@ -35,7 +35,8 @@ struct SimulationResult : SavedState {
 std::uint64_t hash_of_state(const State& state);
 
 /// Runs a scene from its start, or from the last saved state of a run with the same options and folder, to
-/// the given number of steps, or until `most_seconds` have passed, but for at least one step. The folder receives
+/// the given number of steps, or until `most_seconds` have passed, but for at least one step. The folder
+/// receives
 ///   loop.jsonl      a line of JSON for the simulation, then one for each step (experiments/RESULTS.md)
 ///   loop.state      the state after the last saved step, replaced in one move
 ///   loop.recording  with `record`: see recording.hpp
