@@ -46,7 +46,7 @@ struct TypedWorld {
   std::unique_ptr<Scene<S>> played;  ///< the session refers to it
   std::unique_ptr<Session<S>> started;
   std::vector<Copies> given;                        ///< [body], of the first body over its vertices
-  mutable std::uint64_t fetched_for_questions = 0;  ///< positions evaluated for questions, not for the strategy
+  mutable std::uint64_t fetched_for_questions = 0;  ///< positions evaluated for questions only
   PhaseTimes ignored;
   PairBuffer pairs, ended;
   SpanBuffer spans;

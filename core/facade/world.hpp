@@ -332,9 +332,9 @@ class World {
   /// guarantee.
   void pairs(std::vector<WorldPair>& out);
   /// Replaces `begun` and `ended` by the pairs that began and that ceased to intersect since the last call,
-  /// as contact events of a simulator. The first call after `start` or `reset` begins all pairs. Added up, the
-  /// changes equal `pairs`, which may be called in between. Throws std::invalid_argument if both lists are
-  /// the same one.
+  /// as contact events of a simulator. In the first call after `start` or `reset` all pairs begin. Added up,
+  /// the changes equal `pairs`, which may be called in between. Throws std::invalid_argument if both lists
+  /// are the same one.
   void changes(std::vector<WorldPair>& begun, std::vector<WorldPair>& ended);
   /// Advances to t and replaces `out` by the pairs of the elapsed time.
   void spans(double t, std::vector<WorldSpan>& out);
