@@ -27,7 +27,7 @@ TITLE = "BVH update strategies, measured"
 
 
 class NotBuilt(Exception):
-    """Says that the page's program has not been built, or from other sources than those beside it."""
+    """Says that the page's program has not been built, or from other sources than those next to it."""
 
 
 def main(arguments: Optional[list[str]] = None) -> int:

@@ -159,11 +159,14 @@ def facts(all_cases: list[Case]) -> str:
     protruding = int((rows["protrusion"].fillna(0) > 0).sum())
     boxes = "no box was too small" if not protruding else f"{text.plural(protruding, 'contestant')} had a box that was too small"
     disturbed = [str(why) for why in rows["disturbed"] if why]
-    quiet = "the machine was quiet" if not disturbed else f"{text.plural(len(disturbed), 'disturbed clip')} of {len(rows)} (?): {disturbed[0]}"
+    was = "was" if len(disturbed) == 1 else "were"
+    doubt = f"{text.count(len(disturbed))} of {text.plural(len(rows), 'contestant')} {was} disturbed (?), for example: {disturbed[0]}" if disturbed else ""
+    days = sorted({str(when)[:10] for when in rows["when"] if when})
+    day = "undated" if not days else days[0] if len(days) == 1 else f"{days[0]} to {days[-1]}"
     kernels = text.listing(sorted({str(word) for word in rows["kernels"] if word}))
     return (
         f"One thread of {first['cpu'] or 'an unknown processor'} ({kernels or 'unknown'} kernels), float, medians of {counts} repetitions{few}, commit "
-        f"{str(first['commit'])[:12] or 'unknown'}{state}, {str(first['when'])[:10] or 'undated'}; {quiet}. {text.count(frames)} "
+        f"{str(first['commit'])[:12] or 'unknown'}{state}, {day}; {doubt or 'the machine was quiet'}. {text.count(frames)} "
         f"frames were compared with the oracle, each for every contestant ({text.count(comparisons)} comparisons): {found}; {boxes} where boxes can be seen."
     )
 

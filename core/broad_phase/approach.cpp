@@ -89,7 +89,7 @@ Impact find_approach(Contact::Kind kind, const MovingPoints& points, double dist
   };
   if (elements.near_at(0, distance)) return decided({true, 0, 0});
 
-  // Intervals [k, k + 1] / 2^exponent, of which the earliest is on top; all time before it is free.
+  // Intervals [k, k + 1] / 2^exponent, the earliest on top; the elements are apart before it.
   struct Interval {
     unsigned k, exponent;
   };
@@ -109,7 +109,7 @@ Impact find_approach(Contact::Kind kind, const MovingPoints& points, double dist
       ++comparisons;
       if (elements.near_at(begin + length, distance)) return decided({true, begin, begin + length});
     }
-    // A motion that the filter has not decided once, it seldom decides later.
+    // Where the filter has failed once, it seldom decides later.
     by_integers = true;
     comparisons = most_comparisons;
     const Impact impact = find_approach_within(kind, points, distance, k, exponent);

@@ -11,12 +11,12 @@ namespace kbvh {
 ///
 /// Elements are near while the squared distance of two features is at most distance squared and the nearest
 /// points of the features' lines or plane lie inside: inequalities of polynomials of degree 2 to 6 in t. The
-/// filter bisects the motion: no point comes closer per unit of t than the largest difference of two corners'
-/// displacements, so a distance at the middle that exceeds `distance` by more than half an interval's share
-/// excludes the interval. Distances are compared in double with bounds on all rounding, then in dyadic
-/// numbers. An interval that this does not decide, a grazing motion for instance, is decided with integers:
-/// the first t is its begin or a root of one of the polynomials, roots are isolated by Sturm sequences, and
-/// signs at a root are Tarski queries (as in find_impact).
+/// filter bisects the motion: per unit of t, no two points come closer by more than the largest difference of
+/// two corners' displacements, so a distance at the middle that exceeds `distance` by more than half an
+/// interval's share excludes the interval. Distances are compared in double with bounds on all rounding, then
+/// in dyadic numbers. An interval that this does not decide, a grazing motion for instance, is decided with
+/// integers: the first t is its start or a root of one of the polynomials, roots are isolated by Sturm
+/// sequences, and signs at a root are Tarski queries (as in find_impact).
 ///
 /// The filter compares at most about a hundred distances; integers isolate the roots of up to 21 polynomials,
 /// which is far slower and allocates. Thread-safe; `stats`, if given, must not be shared between threads.

@@ -21,7 +21,7 @@ namespace kbvh {
 struct BroadPhaseSettings {
   /// The most elements in a leaf of the trees: 5 to 16. 8 and 16 fill the vector units.
   std::uint32_t leaf_size = 16;
-  /// A tree is built again where its nodes' surface has grown beyond this factor since it was built.
+  /// A tree is built again when the surface of its nodes has grown by more than this factor.
   double most_growth = 2;
   /// Threads that share searches and tests of self intersections. Answers and their order do not depend on
   /// it. At most most_threads() (core/parallel/workers.hpp).
@@ -30,7 +30,7 @@ struct BroadPhaseSettings {
   std::optional<KernelSet> kernels{};
 };
 
-/// The ids of the first vertex, edge and face of those that were inserted; the others follow.
+/// The ids of the first inserted vertex, edge and face; the other inserted ones follow.
 struct InsertedElements {
   std::uint32_t vertex, edge, face;
 };
@@ -75,9 +75,9 @@ class BroadPhase {
     start(v0, v1, make_elements(v0.rows, view_of(e), view_of(f)), radius, Motion::straight);
   }
 
-  /// Takes other positions of the same mesh. O(n), and a refit at the next search.
+  /// Takes new positions of the same mesh. O(n), and a refit at the next search.
   void update(const MatrixView<S>& v);
-  /// Takes another motion of the same mesh.
+  /// Takes a new motion of the same mesh.
   void update(const MatrixView<S>& v0, const MatrixView<S>& v1);
   /// Takes the positions of the vertices `moved` from the rows of V; all other rows must be unchanged since
   /// the last update, and are not read. Costs in proportion to the elements that moved. Throws
@@ -87,10 +87,10 @@ class BroadPhase {
   /// Adds vertices at the positions `v` (k x 3; they rest in a motion) and edges and faces between vertices,
   /// the added ones included. From then on, positions have rows for the added vertices, too. Ids follow the
   /// largest of their kind, that of a removed element included; all other ids are unchanged. A tree whose
-  /// elements become more is built again by the next search. Added elements have the default groups; edges
-  /// and faces have the union of their vertices' present groups where `set_vertex_groups` was the last to set
-  /// those of their kind. A bound for each vertex is the smallest one for added vertices. Throws as `build`
-  /// does.
+  /// elements become more is built again by the next search. Added elements have the default groups, except
+  /// edges and faces if `set_vertex_groups` was the last to set the groups of their kind: these get the union
+  /// of their vertices' groups. If `valid_for` was given a bound for each vertex, added vertices have the
+  /// smallest of these. Throws as `build` does.
   template <IndexMatrix Edges, IndexMatrix Faces>
   InsertedElements insert(const MatrixView<S>& v, const Edges& e, const Faces& f) {
     const std::size_t vertices = elements().vertex_count() + v.rows;
@@ -98,16 +98,16 @@ class BroadPhase {
                element_list(vertices, view_of(f), Element::face));
   }
   /// Removes elements: they are no candidates any more, and their ids are never used again before the next
-  /// `build`. A removed vertex keeps its row in V, and edges and faces that name it stay. Costs in proportion
-  /// to the removed elements and the candidates that are kept; trees shrink, and one that has lost half of
+  /// `build`. A removed vertex keeps its row in V, and edges and faces that name it stay. The cost is in
+  /// proportion to the removed elements and the kept candidates; trees shrink, and one that has lost half of
   /// its elements is built again. Throws std::invalid_argument for an id that does not exist, was removed, or
   /// is named twice.
   void remove(Element element, std::span<const std::uint32_t> ids);
 
-  /// Set groups and masks of all elements of one kind, in place of those set before; none: the default, which
-  /// admits every pair. Two elements are a candidate only if each has a group in the mask of the other;
-  /// searches skip subtrees without such elements. Throw std::invalid_argument for another number of elements
-  /// than there are ids.
+  /// Set groups and masks of all elements of one kind, in place of those set before; an empty list sets the
+  /// default, which admits every pair. Two elements are a candidate only if each has a group in the mask of
+  /// the other; searches skip subtrees without such elements. Throw std::invalid_argument for another number
+  /// of elements than there are ids.
   void set_groups(Element element, std::span<const GroupMask> groups);
   /// Sets them for vertices. Edges and faces get the union of their vertices' groups, and of their masks:
   /// they pair where a vertex of one may pair with a vertex of the other.
@@ -115,7 +115,7 @@ class BroadPhase {
   /// Excludes pairs of one kind, in place of those excluded before. Throws std::invalid_argument for an id
   /// that does not exist.
   void exclude(CandidateKind kind, std::span<const Candidate> pairs);
-  /// Excludes pairs of elements, of all kinds, that at most `rings` edges connect: where a way of so many
+  /// Excludes pairs of elements, of all kinds, that at most `rings` edges connect: a path of at most so many
   /// edges leads from a vertex of one element to a vertex of the other. Edges are those of E and the sides of
   /// faces; removed ones do not count. 0: incident elements only, which never are candidates. The next search
   /// lists the vertices within so many edges of each vertex (about 1 + 3 k + 3 k^2 for k rings of a
@@ -124,7 +124,7 @@ class BroadPhase {
   void exclude_rings(std::uint32_t rings);
   /// Lets a function choose among the pairs that no other filter excludes, many at a time: see PairFunction.
   /// It has to give the same answer whenever it is asked about a pair. Exceptions that it throws end the
-  /// search and pass to the caller. An empty function ends this.
+  /// search and pass to the caller. An empty function removes this filter.
   void keep_only(PairFunction function);
   /// The same with keep(kind, pair), which says whether a pair stays.
   template <class Keep>
@@ -208,9 +208,9 @@ class BroadPhase {
   /// again, up to rounding; 0 where no bound was asked for.
   S left() const { return left_; }
 
-  /// Returns how many searches all kinds together have made since `build`.
+  /// Returns the number of searches since `build`, of all kinds together.
   std::uint64_t detections() const { return detections_; }
-  /// Returns how often positions left the bound of `valid_for`, or came without one.
+  /// Returns how many updates left the bound of `valid_for`, or came while there was none.
   std::uint64_t references() const { return references_; }
   /// Returns the number of box tests of the last search.
   std::uint64_t last_box_tests() const { return last_box_tests_; }
@@ -243,7 +243,7 @@ class BroadPhase {
   InsertedElements add(const MatrixView<S>& v, const Primitives& edges, const Primitives& faces);
   void add_vertices(const MatrixView<S>& v);
   void groups_changed();
-  /// Takes other connections of vertices: with rings, pairs of all kinds may begin or end.
+  /// Notes that vertices are connected differently: with rings, pairs of all kinds may begin or end.
   void connections_changed();
   /// Returns the members of the patches that do not touch themselves during the motion.
   const PatchMembers& certified_patches();
@@ -271,7 +271,7 @@ class BroadPhase {
   S radius_ = 0, half_radius_ = 0;
   Motion motion_ = Motion::none;
   UnfilledArray<S> points_, end_points_;  // [vertex][4]
-  UnfilledArray<S> boxes_;                // [vertex][8], of which the trees are made
+  UnfilledArray<S> boxes_;                // [vertex][8]; the trees are made of these
   std::array<ElementTree<S>, element_kinds> trees_;
   // valid_for
   S displacement_ = 0, left_ = 0;

@@ -68,7 +68,7 @@ const char* kbvh_broad_phase_error(const kbvh_broad_phase* broad);
 int kbvh_broad_phase_build(kbvh_broad_phase* broad, const kbvh_positions* v0, const kbvh_positions* v1,
                            const int32_t* edges, size_t edge_count, const int32_t* faces, size_t face_count,
                            double radius);
-/* Takes other positions of the same mesh, or a motion if v1 is not NULL. */
+/* Takes new positions of the same mesh, or a motion if v1 is not NULL. */
 int kbvh_broad_phase_update(kbvh_broad_phase* broad, const kbvh_positions* v0, const kbvh_positions* v1);
 /* Takes the positions of the vertices moved[0, count); all others must be what they were. */
 int kbvh_broad_phase_update_moved(kbvh_broad_phase* broad, const kbvh_positions* v, const uint32_t* moved,
@@ -93,7 +93,7 @@ int kbvh_broad_phase_set_vertex_groups(kbvh_broad_phase* broad, const kbvh_group
 /* Excludes pairs [count][2] of one kind. */
 int kbvh_broad_phase_exclude(kbvh_broad_phase* broad, kbvh_candidate_kind kind, const uint32_t* pairs,
                              size_t count);
-/* Excludes pairs of elements that at most so many edges connect; 0 ends this. */
+/* Excludes pairs of elements that at most `rings` edges connect; 0 ends this. */
 int kbvh_broad_phase_exclude_rings(kbvh_broad_phase* broad, uint32_t rings);
 /* Lets a function choose among the pairs that no other filter excludes; NULL ends this. */
 int kbvh_broad_phase_keep_only(kbvh_broad_phase* broad, kbvh_pair_filter filter, void* context);

@@ -9,7 +9,7 @@ namespace kbvh {
 
 CandidateChanges ChangeTracker::take(std::span<const Candidate> present, std::uint32_t first_ids) {
   present_.resize(present.size());
-  // places_[i + 1] counts the pairs of id i, then is where the next of them goes, and ends where they end.
+  // places_[i + 1] first counts the pairs of id i, then is the place of the next one, at last of their end.
   places_.assign(std::size_t(first_ids) + 2, 0);
   for (const Candidate& pair : present) {
     KBVH_ASSERT(pair.first < first_ids);

@@ -58,7 +58,7 @@ void check_positions(const MatrixView<S>& v, std::size_t vertices, const char* w
 template <class S>
 S sum_up(S a, S b) {
   const S sum = a + b;
-  // A sum that was rounded down is smaller than one of its parts says.
+  // The rounding error of the sum, exactly; positive if the sum was rounded down.
   const S rest = sum - a;
   const S error = (a - (sum - rest)) + (b - rest);
   return error > 0 ? std::nextafter(sum, std::numeric_limits<S>::infinity()) : sum;

@@ -63,7 +63,8 @@ class ImpactSearch {
     }
   }
 
-  /// Returns those of the given candidates that may be within the separation by the earliest impact.
+  /// Returns those of the given candidates that may come within the separation before the earliest impact
+  /// so far.
   ImpactBatch::Mask leave_out_later(ImpactBatch::Mask which) {
     const ImpactBatch::Mask later = which & batch_.apart_until(earliest_->end, separation_);
     counts_->later += std::uint64_t(std::popcount(later));
@@ -78,7 +79,8 @@ class ImpactSearch {
     if (earliest_->touches &&
         key(earliest_->end, earliest_->kind, earliest_->pair) < key(impact.end, kind_, candidate))
       return;
-    // Every other first contact ends no earlier, so it begins no earlier than this.
+    // The interval of every other first contact ends no earlier than this one's, so no contact comes before
+    // this beginning.
     *earliest_ = {true, kind_, candidate, std::max(0.0, impact.end - impact_width), impact.end};
   }
 

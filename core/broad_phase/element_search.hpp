@@ -26,7 +26,7 @@ struct ElementSearchJob {
   GroupArrays groups_a, groups_b;
   std::size_t usual;                     ///< the number of candidates for which memory is reserved first
   std::span<const WidePair> starts;      ///< the pairs of nodes, or of a node and a leaf, to begin with
-  std::span<const LeafSlot> leaf_pairs;  ///< pairs of leaves that come before: first, second, ...
+  std::span<const LeafSlot> leaf_pairs;  ///< pairs of leaves to be tested first: first, second, ...
 };
 
 /// Searches two trees of elements, or one and itself, from given pairs of nodes on, on one thread or several:
@@ -35,10 +35,10 @@ struct ElementSearchJob {
 template <class S>
 class ElementSearch {
  public:
-  /// Appends the pairs, without incident ones, to `out`: those of each start after those of the starts
-  /// before. `sift(pairs, count, runner)` gets up to some thousands of them at a time, moves those that stay
-  /// to the front and returns their number; its exceptions pass. Several threads call it at a time, each with
-  /// another `runner` below `workers.threads()`. Returns the number of box tests.
+  /// Appends the pairs, without incident ones, to `out`, in the order of the starts. `sift(pairs, count,
+  /// runner)` gets up to some thousands of them at a time, moves those that stay to the front and returns
+  /// their number; its exceptions pass. Several threads call it at a time, each with a `runner` of its own
+  /// below `workers.threads()`. Returns the number of box tests.
   template <class Sift>
   std::uint64_t run(Workers& workers, const ElementSearchJob<S>& job, CandidateBuffer& out,
                     const Sift& sift) {
@@ -62,7 +62,7 @@ class ElementSearch {
       state.stack[state.depth++] = start;
       while (state.depth > 0) {
         traverse(state);
-        // Pairs of few leaves wait for those of the next start.
+        // A few pairs of leaves wait for those of the next start.
         if (state.depth > 0 || state.found > leaf_pair_room / 2) {
           take_in({state.out, 2 * state.found});
           state.found = 0;
@@ -90,7 +90,7 @@ class ElementSearch {
     CandidateBuffer found;
     std::uint64_t tests = 0;
   };
-  /// Pairs of leaves, and what a runner found of them: [begin, end) of its list, which goes to `to`.
+  /// Pairs of leaves, and what a runner found for them: [begin, end) of its list, to be copied to `to`.
   struct Batch {
     std::span<const LeafSlot> leaf_pairs;
     std::uint32_t runner;
@@ -116,7 +116,7 @@ class ElementSearch {
     std::uint64_t tests = front_.traverse(
         workers,
         [&](std::uint32_t i, WideTraversal& state) {
-          // A front begins at the roots, which no other pair on a stack consists of.
+          // The front starts with a pair of roots, which occurs nowhere else: the job's start replaces it.
           WidePair& bottom = state.stack[0];
           if (bottom.first == 0 && bottom.second == 0) bottom = job.starts[i];
           traverse(state);
@@ -144,7 +144,7 @@ class ElementSearch {
       tests += room.tests;
       all += room.found.size();
     }
-    // Another search may give all work to one thread; no memory is then allocated.
+    // The next search may give all work to one thread: room for that, so that it allocates nothing.
     for (Runner& room : runners_) room.found.reserve(all + element_pairs_step);
     out.resize(to);
     const Parts cut{batches_.size(), 8};

@@ -35,9 +35,9 @@ class ElementTree {
   void forget() { state_ = State::unbuilt; }
   /// Updates a current tree whose boxes of `moved` vertices changed: leaves of their elements, and the nodes
   /// above as far as boxes change. O(elements at the vertices x height). The first call makes lists of the
-  /// elements at each vertex, O(corners). Once as many nodes were computed again as there are, the surface is
-  /// compared as in `refresh`; where it has grown too much, the tree counts as outdated, and the next
-  /// `refresh` builds it again.
+  /// elements at each vertex, O(corners). Once partial refits have recomputed as many nodes as the tree has,
+  /// the surface is compared as in `refresh`; if it has grown too much, the tree counts as outdated, and the
+  /// next `refresh` builds it again.
   void refit_moved(const S* vertex_boxes, std::uint32_t vertices, std::span<const std::uint32_t> moved,
                    double most_growth);
 
@@ -45,19 +45,19 @@ class ElementTree {
   void elements_inserted();
   /// Takes further vertices: elements are still the same.
   void vertices_inserted() { first_of_vertex_.clear(); }
-  /// Takes elements out that have just been removed from their list: from their leaves, the boxes of which,
-  /// and of the nodes above, shrink; a tree that is not current only loses the elements. O(elements x
+  /// Takes elements that have just been removed from their list out of their leaves. In a current tree, the
+  /// boxes of these leaves and of the nodes above shrink; otherwise boxes stay as they are. O(elements x
   /// height).
   void elements_removed(const S* vertex_boxes, std::span<const std::uint32_t> ids);
 
   /// Returns what searches read; the tree must be current and not empty.
   ElementLeaves<S> leaves();
-  /// Returns the groups of all elements, or of elements that all have the default, or-ed up the tree, which
-  /// must be current and not empty. O(elements) after a build or `forget_groups`, else O(1).
+  /// Returns the groups of the elements, or-ed up the tree, which must be current and not empty; an empty
+  /// list: all have the default. O(elements) after a build or `forget_groups`, else O(1).
   GroupArrays groups(std::span<const GroupMask> of_elements);
   void forget_groups() { groups_listed_ = false; }
   /// Returns the contours of the patches below the nodes of a tree over faces, which must be current and not
-  /// empty. After a build or a removal as expensive as a build, else O(1).
+  /// empty. The first call after a build or a removal costs as much as a build, others O(1).
   const FaceContours& contours(std::uint32_t vertices);
   bool empty() const { return tree_.empty(); }
   std::uint32_t padded_leaf_size() const { return tree_.padded_leaf_size(); }

@@ -23,10 +23,9 @@ struct Feature {
   LongPolynomial beyond;
 };
 
-/// The two elements as features. Any feature that is near proves that the elements are, and of elements that
-/// are near one feature is: that of their nearest points. So the set of times at which the elements are near
-/// is closed, and where it begins, a feature begins to be near at a root of one of its polynomials other than
-/// `size`, which is positive there.
+/// The two elements as features. Elements are near exactly when one of their features is: that of their
+/// nearest points. So the set of times at which the elements are near is closed; where it begins, a feature
+/// begins to be near, at a root of one of its polynomials other than `size`, which is positive there.
 class Approach {
  public:
   Approach(Contact::Kind kind, const Dyadic (&begin)[4][3], const Dyadic (&end)[4][3], double distance) {

@@ -73,7 +73,7 @@ void FaceContours::keep_contour(std::uint32_t node) {
     for (const FaceSide& side : left_) side_from_[side.from] = 0;
     return;
   }
-  // As many sides end at a vertex as begin there, so each way from a side on leads back to it.
+  // As many sides end at a vertex as begin there, so every path from a side leads back to it.
   for (const FaceSide& start : left_)
     for (std::uint32_t from = start.from; side_from_[from] != 0;) {
       const FaceSide& side = left_[side_from_[from] - 1];

@@ -31,14 +31,14 @@ struct GroupMask {
 using PairFunction = std::function<std::size_t(CandidateKind kind, std::span<Candidate> pairs)>;
 
 /// The pairs of elements that may be candidates at all: groups and masks, rings, excluded pairs, and a
-/// function of the caller. All of them together decide; incidence is no matter of this filter.
+/// function of the caller. A pair has to pass all of them. Incident pairs are left out elsewhere.
 class PairFilter {
  public:
   /// Ends all filters. Keeps memory.
   void clear();
 
-  /// Set the groups of all elements of one kind; none: all pairs are admitted. Throws std::invalid_argument
-  /// for another number of elements.
+  /// Set the groups of all elements of one kind; an empty list admits all pairs. Throws
+  /// std::invalid_argument for another number of elements.
   void set_groups(const Elements& elements, Element element, std::span<const GroupMask> groups);
   /// Sets the groups of vertices; those of an edge or a face are the union of its vertices' groups, and its
   /// mask the union of their masks. Throws as `set_groups` does.
@@ -60,13 +60,13 @@ class PairFilter {
     rings_listed_ = false;
   }
   std::uint32_t rings() const { return rings_; }
-  /// Takes other connections of vertices: rings are listed again by the next `prepare`.
+  /// Notes that vertices are connected differently: the next `prepare` lists rings again.
   void connections_changed() { rings_listed_ = false; }
   /// Lists rings, if they are asked for and not listed; before the first `keep`. Throws as
   /// VertexRings::build does.
   void prepare(const Elements& elements);
 
-  /// Takes further elements: with the default groups, or the union of their vertices' present ones if the
+  /// Takes further elements: with the default groups, or with the union of their vertices' groups if the
   /// groups of their kind were set by `set_vertex_groups`.
   void elements_inserted(const Elements& elements);
 

@@ -27,8 +27,8 @@ namespace kbvh {
 template <class S>
 class PatchCertificate {
  public:
-  /// Takes positions, [vertex][4]: at rest if `end` is null, else in straight motion from `begin` to `end`,
-  /// of which all certificates then hold for the whole. They have to outlive the calls.
+  /// Takes positions, [vertex][4]: at rest if `end` is null, else in straight motion from `begin` to `end`;
+  /// certificates then hold for the whole motion. The positions have to outlive the calls.
   void take(const S* begin, const S* end) {
     begin_ = begin;
     end_ = end;
@@ -69,13 +69,13 @@ class PatchCertificate {
     double begin[3], end[3];
   };
   struct Extent {
-    double low[2], high[2];  ///< the projection contains the point at every time
+    double low[2], high[2];  ///< contain the projection of the side at every time
     std::uint32_t side;
   };
   Moving difference(std::uint32_t to, std::uint32_t from) const;
   /// Returns the sign of axis . (a x b) throughout the motion; 0 if it is not certain, or changes.
   int turn(const Axis& axis, const Moving& a, const Moving& b);
-  /// Returns whether two sides, the second of which begins where the first one ends, do not overlap.
+  /// Returns whether two consecutive sides do not overlap: the second one begins where the first one ends.
   bool goes_on(const Axis& axis, const FaceSide& first, const FaceSide& second);
   /// Returns whether a line through one of two sides separates it from the other.
   bool apart(const Axis& axis, const FaceSide& a, const FaceSide& b);

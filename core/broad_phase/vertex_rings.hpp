@@ -20,7 +20,7 @@ class VertexRings {
 
  private:
   void list_neighbours(const Elements& elements);
-  /// Returns a word with one bit, by which a list without the vertex is told from most others.
+  /// Returns the bit of a vertex in a signature: a list whose signature lacks it does not have the vertex.
   static std::uint64_t bit(std::uint32_t vertex) {
     return std::uint64_t(1) << (vertex * std::uint32_t(2654435769) >> 26);
   }

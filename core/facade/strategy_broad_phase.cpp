@@ -40,7 +40,7 @@ Primitives over_corners(const Primitives& primitives) {
   return nets;
 }
 
-/// Returns whether two views are the same: views of one memory may differ in strides or sizes.
+/// Returns whether two views are the same: views of the same memory may differ in strides or sizes.
 template <class S>
 bool same_view(const MatrixView<S>& a, const MatrixView<S>& b) {
   return a.data == b.data && a.rows == b.rows && a.columns == b.columns && a.row_step == b.row_step &&
@@ -136,8 +136,8 @@ void StrategyBroadPhase<S>::detect(CandidateKind kind, CandidateBuffer& out) {
     search->session.hand_in(0, corners_.data());
     search->session.advance(time_, search->ignored);
   }
-  // `query` confirms each candidate by a comparison of its two boxes, without filters and motions, too: a
-  // strategy promises that its candidates contain the pairs, not that they are the pairs. Lazy strategies,
+  // `query` confirms each candidate by comparing its two boxes, also without filters and motions: a strategy
+  // promises that its candidates contain the pairs, not that they are the pairs. Lazy strategies,
   // inflated or drifting boxes and volumes other than boxes list more, and no property says which do not.
   search->session.query(search->pairs, search->ignored);
   out.resize(search->pairs.size());

@@ -21,16 +21,16 @@ struct StrategySearch;
 
 /// The candidates of a simulation, like those of BroadPhase, found by a strategy of the registry: to compare
 /// strategies in a simulator, and simulators' meshes in the study. Positions are not known in advance, so the
-/// strategy must have no foresight; it must take control nets, and pairs within a body for candidates of
-/// elements of one kind.
+/// strategy must need no foresight. It must accept control nets and, for candidates of elements of one kind,
+/// answer pairs within a body.
 ///
 /// Vertices, edges and faces are bodies over one vertex set, whose vertices are the two corners of each
 /// vertex's box: it encloses the vertex, or its motion, grown by radius / 2 and rounded outward as in
 /// BroadPhase. Candidates of an exact strategy are therefore the same set as those of BroadPhase, in another
 /// order. Filters sift what the strategy found: they do not shorten its search.
 ///
-/// S is float or double. Positions, indices and errors are as in BroadPhase. What a strategy allocates is its
-/// own matter.
+/// S is float or double. Positions, indices and errors are as in BroadPhase. Strategies may allocate at any
+/// call.
 template <class S>
 class StrategyBroadPhase {
  public:
@@ -54,7 +54,7 @@ class StrategyBroadPhase {
              double radius = 0) {
     start(v0, v1, make_elements(v0.rows, view_of(e), view_of(f)), radius);
   }
-  /// Takes other positions of the same mesh, or another motion. O(n). Throws std::logic_error before `build`.
+  /// Takes new positions of the same mesh, or a new motion. O(n). Throws std::logic_error before `build`.
   void update(const MatrixView<S>& v) { take(v, v); }
   void update(const MatrixView<S>& v0, const MatrixView<S>& v1) { take(v0, v1); }
 

@@ -46,7 +46,7 @@ struct TypedWorld {
   std::unique_ptr<Scene<S>> played;  ///< the session refers to it
   std::unique_ptr<Session<S>> started;
   std::vector<Copies> given;                        ///< [body], of the first body over its vertices
-  mutable std::uint64_t fetched_for_questions = 0;  ///< positions that are no work of the strategy
+  mutable std::uint64_t fetched_for_questions = 0;  ///< positions evaluated for questions only
   PhaseTimes ignored;
   PairBuffer pairs, ended;
   SpanBuffer spans;
@@ -72,7 +72,8 @@ struct TypedWorld {
     return *started;
   }
   double time() const { return session().playback().time(); }
-  /// Throws std::logic_error if the world has a radius; `lacks` is what it then lacks, as a verb and nouns.
+  /// Throws std::logic_error if the world has a radius; `lacks` is the end of its sentence, as in "finds no
+  /// contacts".
   void check_no_radius(const char* lacks) const {
     if (radius) throw std::logic_error(std::string("a world with a radius consists of boxes and ") + lacks);
   }

@@ -292,8 +292,8 @@ class World {
   /// `realisers` and in events: the corners 2 v (lower) and 2 v + 1 (upper) of its box; positions are those
   /// of the vertices. Throws std::invalid_argument for a radius that is negative or no admissible length.
   void set_radius(double radius);
-  /// Requests pairs of these two bodies, or within one body if both are the same. Without any such call, the
-  /// pairs of all bodies are requested, and no pairs within a body.
+  /// Requests pairs of these two bodies, or within one body if both are the same. Without any such call,
+  /// pairs of all bodies are requested, but none within a body.
   void add_pair(std::uint32_t body_a, std::uint32_t body_b);
 
   /// Chooses the strategy by its id, with parameters as text, and starts at time t. The hierarchies are built
@@ -331,10 +331,10 @@ class World {
   /// Replaces `out` by the pairs of primitives that intersect at the current time, under the strategy's
   /// guarantee.
   void pairs(std::vector<WorldPair>& out);
-  /// Replaces `begun` and `ended` by the pairs that began and ended to intersect since the last call, as
-  /// contact events of a simulator. The first call after `start` or `reset` begins all pairs. Added up, the
-  /// changes equal `pairs`, which may be called in between. Throws std::invalid_argument if both lists are
-  /// the same one.
+  /// Replaces `begun` and `ended` by the pairs that began and that ceased to intersect since the last call,
+  /// as contact events of a simulator. In the first call after `start` or `reset` all pairs begin. Added up,
+  /// the changes equal `pairs`, which may be called in between. Throws std::invalid_argument if both lists
+  /// are the same one.
   void changes(std::vector<WorldPair>& begun, std::vector<WorldPair>& ended);
   /// Advances to t and replaces `out` by the pairs of the elapsed time.
   void spans(double t, std::vector<WorldSpan>& out);
@@ -355,7 +355,8 @@ class World {
   /// Replaces `out` by the hierarchy of a body; returns false if the strategy's hierarchy is not visible.
   bool hierarchy(std::uint32_t body, WorldHierarchy& out) const;
   /// Replaces `out` by the positions of a body with known motion at t, correctly rounded, on its current
-  /// plans, without any change of time. For times before the last change of a plan the answer is meaningless.
+  /// plans; the world's time stays as it is. For times before the last change of a plan the answer is
+  /// meaningless.
   void positions(std::uint32_t body, double t, std::vector<double>& out) const;
   /// Replaces `out` by the vertex that realises each side of each node of `hierarchy`, [node][6], side 2 *
   /// axis

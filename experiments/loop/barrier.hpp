@@ -32,7 +32,7 @@ struct Barrier {
   static constexpr double least_closeness = 1e-9;
 };
 
-/// The rest shape of a pair as far as the barrier uses it: for two edges, the squared area of the
+/// The part of a pair's rest shape that the barrier uses: for two edges, the squared area of the
 /// parallelogram that they span, below which the energy fades out. Without it, forces would jump where two
 /// edges are parallel. 0: never.
 struct Fading {
@@ -46,8 +46,8 @@ inline Fading fading_of_edges(double first, double second) {
 /// Returns the energy of a pair in J.
 double pair_energy(const Barrier& barrier, ContactKind kind, const FourPoints& points, const Fading& fading);
 
-/// Whether a Hessian is the one of the energy, or the nearest one without negative eigenvalues (in the
-/// Frobenius norm), which makes a sum of them positive definite.
+/// Whether a Hessian is that of the energy, or the nearest one (in the Frobenius norm) without negative
+/// eigenvalues, so that sums of Hessians have none either.
 enum class Curvature : std::uint8_t { exact, positive };
 
 struct PairForce {

@@ -110,8 +110,7 @@ double ContactFinder::look_along(std::uint32_t iterate, const Positions& x, cons
   const auto searched = std::chrono::steady_clock::now();
   double part = 1;
   EarliestImpact impact = detector_.earliest_impact(separation);
-  // A time of impact is enclosed to 2^-20 of the motion: where that is too coarse, a shorter part is asked
-  // about.
+  // A time of impact is enclosed to 2^-20 of the motion: if that is too coarse, ask about a shorter part.
   while (impact.touches && impact.begin < 0x1p-10 && part > 1e-12) {
     part *= 0x1p-9;
     part_ = x + part * (end - x);

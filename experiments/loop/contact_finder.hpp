@@ -53,7 +53,7 @@ class IterateDetector {
   /// Returns the number of searches, of one kind of pairs each.
   std::uint64_t searches() const { return by_strategy_ ? by_strategy_->searches() : broad_.detections(); }
   std::size_t bytes() const { return by_strategy_ ? by_strategy_->bytes() : broad_.bytes(); }
-  /// Returns the broad phase, for what strategies do not answer; unused if a strategy is named.
+  /// Returns the broad phase, for questions that strategies do not answer; unused if a strategy is named.
   BroadPhase<double>& broad() { return broad_; }
   const Settings& settings() const { return settings_; }
 
@@ -74,7 +74,7 @@ class IterateSink {
   virtual void take(std::uint32_t iterate, const Positions& x, const Positions& end) = 0;
 };
 
-/// What finding pairs took, summed up.
+/// The cost of finding pairs, summed up.
 struct DetectionWork {
   double detect_seconds = 0;     ///< updates and candidates
   double impact_seconds = 0;     ///< exact tests of candidates for the earliest impact
@@ -98,9 +98,9 @@ class ContactFinder {
 
   /// Makes the candidates those of positions: all pairs within the radius, and others.
   void look_at(const Positions& x);
-  /// Makes the candidates those of a motion: all pairs that come within the radius, and others. Returns a
-  /// part of the motion, at most 1, at whose end, and before, no pair is within the separation; 0 if there is
-  /// none above 10^-12.
+  /// Makes the candidates those of a motion: all pairs that come within the radius, and others. Returns how
+  /// much of the motion, at most 1, is free: no pair comes within the separation until its end. Returns 0 if
+  /// that would be less than 10^-12.
   double look_along(std::uint32_t iterate, const Positions& x, const Positions& end, double separation);
 
   /// Calls take(pair) for each candidate, in an order that depends on the trees.

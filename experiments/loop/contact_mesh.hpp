@@ -9,7 +9,7 @@
 
 namespace kbvh::experiments::loop {
 
-/// What a broad phase is told about a mesh: which of its elements may touch.
+/// What a broad phase has to know about a mesh: which of its elements may touch.
 struct ContactMesh {
   std::uint32_t vertices = 0;
   EdgeList edges;

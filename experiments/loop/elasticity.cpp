@@ -32,7 +32,7 @@ void add_springs(const SimulatedMesh& mesh, const Positions& x, double factor, N
   for (const Spring& spring : mesh.springs) {
     const Eigen::Vector3d along = (x.row(spring.a) - x.row(spring.b)).transpose();
     const double length = along.norm();
-    if (length == 0) continue;  // No direction: the force is taken to be none.
+    if (length == 0) continue;  // No direction: no force.
     const Eigen::Vector3d unit = along / length;
     const double stiffness = factor * spring.stiffness;
     const Eigen::Vector3d gradient = stiffness * (length - spring.length) * unit;

@@ -14,7 +14,7 @@ PairFriction pair_friction(const Barrier& barrier, ContactKind kind, const FourP
   friction.weights = closest.weights;
   friction.tangents << tangent, normal.cross(tangent);
   friction.slip = slip;
-  // The barrier's force along the normal, of which the fading of parallel edges takes its share.
+  // The barrier's force along the normal, reduced by the fading of parallel edges.
   const double share = pair_energy(barrier, kind, begin, fading) / barrier.energy(closest.squared_distance);
   friction.limit = -2 * coefficient * distance * barrier.slope(closest.squared_distance) * share;
   return friction;

@@ -30,9 +30,9 @@ double mean_mass(const SimulatedMesh& mesh) {
   return count == 0 ? 1 : sum / double(count);
 }
 
-/// The share of the decrease that the slope promises with which a line search is content.
+/// A line search accepts a step that gives at least this share of the decrease that the slope promises.
 constexpr double sufficient_decrease = 1e-4;
-/// Differences of energies below this share of the energy are rounding.
+/// Differences of energies below this share of the energy count as rounding errors.
 constexpr double energy_rounding = 1e-12;
 /// A line search gives up at this part of a direction.
 constexpr double least_part = 1e-10;
@@ -168,7 +168,7 @@ StepReport ImplicitStep::advance(State& state) {
   for (std::uint32_t v = 0; v < mesh.vertex_count(); ++v)
     if (mesh.is_free(v)) free_.row(v) += h * state.velocities.row(v) + h * h * physics.gravity.transpose();
   script_.place(double(state.step + 1) * h, free_);
-  // A step depends on its begin alone, so that one that is continued has the bits of one that was not.
+  // A step depends on the state at its start alone, so a continued run has the bits of an uninterrupted one.
   system_.forget_entries();
   const std::uint64_t orders_before = system_.orders();
   x_ = begin_ = state.positions;
@@ -199,7 +199,7 @@ StepReport ImplicitStep::advance(State& state) {
         part /= 2;
     }
     if (!accepted) {
-      // Without a sensible direction left, rounding decides whether the energy decreases.
+      // When no sensible direction is left, rounding decides whether the energy decreases.
       result.ending = size <= physics.tolerance ? Ending::converged : Ending::stalled;
       break;
     }

@@ -21,8 +21,8 @@ struct State {
 /// Returns the state in which a scene starts.
 State first_state(const SimulatedMesh& mesh);
 
-/// Reports a state in which a pair of surfaces is nearer than their thickness: an earlier step was not told
-/// of this pair.
+/// Reports a state in which a pair of surfaces is nearer than their thickness: the finder lost this pair in
+/// an earlier step.
 struct TooNear : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -52,11 +52,11 @@ struct StepReport {
 
 /// Steps of implicit Euler in their variational form: the end of a step minimises
 ///   sum of mass / 2 |x - x_free|^2 + time_step^2 (elastic energy + energies of barriers and friction),
-/// where x_free is where vertices fly without forces but gravity. Newton's method with Hessians whose
+/// where x_free is where vertices would fly under gravity alone. Newton's method with Hessians whose
 /// negative eigenvalues are set to zero pair by pair, spring by spring; a line search that never leaves the
 /// part of a direction that is free of impacts (Li et al. 2020, "Incremental Potential Contact"). All pairs
-/// come from the finder: one that it loses is not kept apart. For driven vertices, x_free is where the script
-/// wants them: contact holds them back by its force times time_step^2 over their mass.
+/// come from the finder: a pair that it loses is not kept apart. For driven vertices, x_free is where the
+/// script wants them: contact holds them back by its force times time_step^2 over their mass.
 ///
 /// Equal states and scenes give equal bits in one build, in whatever order the finder lists pairs.
 class ImplicitStep {
@@ -99,7 +99,7 @@ class ImplicitStep {
     std::uint32_t vertices[4];
     PairFriction friction;
   };
-  std::vector<Rubbing> rubbing_;      // pairs that repel each other at the begin of the step
+  std::vector<Rubbing> rubbing_;      // pairs that repel each other at the start of the step
   std::vector<double> edge_lengths_;  // [edge] at rest
 };
 

@@ -61,16 +61,16 @@ std::vector<Vector3> resampled(std::span<const Vector3> line, std::size_t count)
   return points;
 }
 
-/// Returns the largest radius of a rope along this line, times two, that neither touches itself nor bends
-/// more sharply than its radius: the distance of parts that are a tenth of the length apart, and twice the
-/// radius of curvature.
+/// Returns the largest diameter of a rope along this line that neither touches itself nor bends more sharply
+/// than its radius: the smallest distance between parts that are a tenth of the length apart or more, or
+/// twice the smallest radius of curvature.
 double room_of(std::span<const Vector3> line) {
   double least = std::numeric_limits<double>::infinity();
   const std::size_t apart = line.size() / 10;
   for (std::size_t i = 0; i < line.size(); ++i)
     for (std::size_t j = i + apart; j < line.size(); ++j) least = std::min(least, (line[i] - line[j]).norm());
   for (std::size_t i = 1; i + 1 < line.size(); ++i) {
-    // The radius of the circle through three points.
+    // Twice the radius of the circle through three points.
     const Vector3 a = line[i] - line[i - 1], b = line[i + 1] - line[i];
     const double twice_area = a.cross(b).norm();
     if (twice_area > 0) least = std::min(least, a.norm() * b.norm() * (a + b).norm() / twice_area);

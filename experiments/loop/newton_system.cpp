@@ -84,7 +84,7 @@ void NewtonSystem::place_blocks() {
   for (std::size_t i = 0; i < pattern_.size(); ++i) {
     const int row = place_[row_of(pattern_[i])], column = place_[column_of(pattern_[i])];
     placed_.push_back({key_of(std::min(row, column), std::max(row, column)), std::uint32_t(i)});
-    // An entry has the rows of the block with the larger number, which may be the later one here, or not.
+    // An entry has the rows of the vertex with the larger number, which may come first or second here.
     slots_[i].shape = row == column  ? Slot::Shape::diagonal
                       : row < column ? Slot::Shape::straight
                                      : Slot::Shape::transposed;
@@ -97,7 +97,7 @@ void NewtonSystem::place_blocks() {
   for (std::size_t begin = 0, end = 0; begin < placed_.size(); begin = end) {
     const std::size_t column = column_of(placed_[begin].key);
     while (end < placed_.size() && column_of(placed_[end].key) == column) ++end;
-    // The block of the diagonal is the last one of its column, of which the upper triangle is stored.
+    // The diagonal block is the last one of its column; only its upper triangle is stored.
     const int above = 3 * int(end - begin - 1);
     for (std::size_t b = begin; b < end; ++b) {
       Slot& slot = slots_[placed_[b].index];

@@ -12,25 +12,24 @@ namespace kbvh::experiments::loop {
 /// The linear system of an iteration of Newton's method: gradient and Hessian of an energy by the coordinates
 /// of the vertices that are not fixed. Sums are in the order of the calls, so equal calls give equal bits.
 ///
-/// The Hessian keeps every block that an earlier sum had since `forget_entries`, as zeros if need be: only a
-/// block that is new asks for another order of elimination and another symbolic factorisation, which
-/// allocate. Everything else reuses its memory, but for what Eigen's numeric factorisation takes and returns
-/// at once: an array of indices, and three more of a number for each row where these are too large for its
-/// stack.
+/// The Hessian keeps every block that an earlier sum had since `forget_entries`, as zeros if need be. Only a
+/// new block needs a new order of elimination and a new symbolic factorisation, which allocate. Everything
+/// else reuses its memory, except Eigen's numeric factorisation, which allocates and frees an array of
+/// indices and, if these are too large for its stack, three arrays of one number a row.
 class NewtonSystem {
  public:
   explicit NewtonSystem(const SimulatedMesh& mesh);
 
   /// Starts a new sum at zero.
   void clear();
-  /// Starts as if there had been no sum yet: what follows depends on the calls from here on.
+  /// Starts as if there had been no sum yet: all that follows depends only on the calls from here on.
   void forget_entries() { pattern_.clear(); }
   void add_gradient(std::uint32_t vertex, const Eigen::Vector3d& gradient) {
     if (const std::int32_t block = block_of_[vertex]; block >= 0) gradient_.segment<3>(3 * block) += gradient;
   }
   /// Adds a symmetric block of a vertex.
   void add_block(std::uint32_t vertex, const Eigen::Matrix3d& block);
-  /// Adds the block of rows of one vertex and columns of another one, and its transpose at the other place.
+  /// Adds the block of one vertex's rows and another one's columns, and its transpose in the mirrored place.
   void add_block(std::uint32_t row, std::uint32_t column, const Eigen::Matrix3d& block);
 
   /// Solves Hessian * direction = -gradient by a sparse Cholesky factorisation, where every vertex that is
@@ -41,7 +40,7 @@ class NewtonSystem {
   const Eigen::VectorXd& gradient() const { return gradient_; }
   /// Returns the derivative of the energy along a direction.
   double slope(const Positions& direction) const;
-  /// Returns how often the order of elimination was computed.
+  /// Returns how many orders of elimination were computed.
   std::uint64_t orders() const { return orders_; }
   /// Returns the memory in bytes, the factor included.
   std::size_t bytes() const;

@@ -140,7 +140,7 @@ class Truth {
   Elements elements_;
 };
 
-/// Adds the ways that answer a question, as many for each that is asked; the way `refit` comes first.
+/// Adds the ways that answer each question that is asked; the way `refit` comes first.
 void add_ways(const RecordingHeader& header, IterateQuestion question, const PlaySettings& settings,
               std::vector<std::unique_ptr<Contestant>>& ways) {
   const auto add = [&](PlayedWay way, const ContactStrategy& strategy, std::uint32_t lose_every) {

@@ -11,14 +11,14 @@ namespace kbvh::experiments::loop {
 
 /// What is asked at each iterate of a recording.
 enum class IterateQuestion : std::uint8_t {
-  near,    ///< the pairs within the radius at the begin of the motion, exactly: equal in all ways
+  near,    ///< the pairs within the radius at the start of the motion, exactly: equal in all ways
   swept,   ///< the pairs whose swept boxes overlap: equal in the ways that keep nothing, else a superset
   impact,  ///< the earliest impact of the motion, at the separation: equal in all ways
 };
 /// Returns the question in words.
 const char* name(IterateQuestion question);
 
-/// A strategy that a recording is played to.
+/// A strategy to which a recording is played.
 struct PlayedStrategy {
   std::string label;  ///< for tables
   ContactStrategy strategy;
@@ -55,7 +55,7 @@ struct PlayedWay {
 struct PlayResult {
   std::uint64_t iterates = 0, steps = 0;
   std::uint64_t truths = 0;      ///< iterates that were compared with all pairs
-  std::uint64_t true_pairs = 0;  ///< within the radius at the begin of these
+  std::uint64_t true_pairs = 0;  ///< within the radius at the start of these
   std::vector<PlayedWay> ways;
   /// Returns whether all ways that promise every pair agree and list all true pairs.
   bool agree() const;

@@ -15,8 +15,8 @@ namespace kbvh::experiments::loop {
 ///   8      "KBVHLOOP"
 ///   4      version, 1
 ///   4 x 4  numbers of vertices n, edges m, faces k, inner vertices i
-///   8      radius, double, m: pairs within it were sought
-///   8      separation, double, m: impacts were sought at it
+///   8      radius, double, m: pairs within it were asked for
+///   8      separation, double, m: impacts at it were asked for
 ///   n      1 for each vertex of an obstacle, else 0: elements of such vertices alone are no pairs
 ///   8 m    edges, two vertices each, 4 bytes a vertex
 ///   12 k   faces, three vertices each
@@ -27,7 +27,7 @@ namespace kbvh::experiments::loop {
 ///   4      step, from 0
 ///   4      iterate within its step, from 0
 ///   8      displacement, double, m: no coordinate of a vertex changes by more during the motion
-///   24 n   positions x at the begin of the motion, 3 doubles a vertex
+///   24 n   positions x at the start of the motion, 3 doubles a vertex
 ///   24 n   positions at its end
 ///
 /// The simulator moved along a part of each motion; the next one of the same step begins where it stopped.
@@ -46,13 +46,13 @@ struct RecordedIterate {
 /// Writes a recording while a simulation runs.
 class RecordingWriter : public IterateSink {
  public:
-  /// Starts a file, in place of one that is there.
+  /// Starts a file and replaces an existing one.
   RecordingWriter(std::filesystem::path file, const RecordingHeader& header);
   /// Continues a file after its first `bytes` bytes; what follows them is cut off. Throws io::InputError if
   /// the file is shorter, or does not begin with this header.
   RecordingWriter(std::filesystem::path file, const RecordingHeader& header, std::uint64_t bytes);
 
-  /// Sets the step that following iterates belong to.
+  /// Sets the step to which the next iterates belong.
   void begin_step(std::uint32_t step) { step_ = step; }
   /// Throws io::InputError if the file cannot be written.
   void take(std::uint32_t iterate, const Positions& x, const Positions& end) override;
@@ -72,7 +72,7 @@ class RecordingWriter : public IterateSink {
 };
 
 /// Reads a recording, one iterate after the other. Throws io::InputError, with file and place, for a file
-/// that is none: a wrong begin, numbers that do not fit its size, ids out of range, coordinates that are no
+/// that is none: a wrong header, numbers that do not fit its size, ids out of range, coordinates that are no
 /// numbers.
 class RecordingReader {
  public:

@@ -6,9 +6,9 @@
 
 namespace kbvh::experiments::loop {
 
-/// What a simulation needs to go on after it was ended at any time.
+/// What a simulation needs to continue after it was ended at any time.
 struct SavedState {
-  std::uint64_t options = 0;                           ///< a hash of the options: others cannot continue it
+  std::uint64_t options = 0;                           ///< a hash of the options, to be equal
   std::uint64_t lines_bytes = 0, recording_bytes = 0;  ///< of the other files when it was saved
   std::uint64_t penetrations = 0;                      ///< intersecting pairs of triangles, summed over steps
   std::uint64_t first_penetration = 0;  ///< the number of steps after which the first were counted; 0: none

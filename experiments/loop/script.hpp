@@ -15,8 +15,8 @@ struct Pose {
 /// Computes the poses of all joints at a time in s; at 0 each is the identity. `poses` is replaced.
 void pose_joints(const std::vector<Joint>& joints, double time, std::vector<Pose>& poses);
 
-/// Places the vertices of a mesh that follow its joints. Where they are depends on the time alone, so a run
-/// that is continued needs no more than its step.
+/// Places the vertices of a mesh that follow its joints. Their places depend on the time alone, so a
+/// continued run needs no more than the number of its step.
 class ScriptPlayer {
  public:
   /// Keeps a reference to the mesh.

@@ -28,8 +28,8 @@ struct Hinge {
   double stiffness;  ///< N/m
 };
 
-/// A joint of a script: what hangs on it turns about an axis and is carried along. Everything stands still,
-/// in the pose of the mesh, at time 0, and starts within half a second.
+/// A joint of a script: what hangs on it turns about an axis and is carried along. At time 0 everything is at
+/// rest, in the pose of the mesh; it is in full motion within half a second.
 struct Joint {
   std::int32_t parent = -1;         ///< an earlier joint, which carries this one; -1: none
   Eigen::Vector3d pivot{0, 0, 0};   ///< m, at time 0
@@ -62,7 +62,7 @@ struct SimulatedMesh {
   bool is_free(std::uint32_t vertex) const { return fixed[vertex] == 0 && !is_driven(vertex); }
 };
 
-/// What holds for a whole simulation.
+/// The constants of a simulation.
 struct Physics {
   double time_step = 0.01;               ///< s
   Eigen::Vector3d gravity{0, 0, -9.81};  ///< m/s^2
@@ -138,7 +138,7 @@ class MeshBuilder {
   std::uint32_t add_cloth(const Grid& grid, std::span<const Eigen::Vector3d> points,
                           const Material& material);
   /// A soft rope with closed ends: springs within each ring and between neighbours. Returns its first vertex;
-  /// ring i has the vertices (sides + 1) i to (sides + 1) i + sides, of which the last is its centre.
+  /// ring i has the vertices (sides + 1) i to (sides + 1) i + sides; the last one is its centre.
   std::uint32_t add_rope(const Rope& rope);
   /// A soft box of cells^3 cells: springs along edges and diagonals of the cells. Returns its first vertex.
   std::uint32_t add_soft_box(const Eigen::Vector3d& low, double side, std::uint32_t cells, double density,
@@ -146,8 +146,8 @@ class MeshBuilder {
   void fix(std::uint32_t vertex) { fixed_[vertex] = obstacle_[vertex] = 1; }
   /// Adds a joint and returns its number.
   std::int32_t add_joint(const Joint& joint);
-  /// Lets a vertex follow a joint: a particle of 10 kg, whose flight without forces is the script. Contact
-  /// can hold it back a little (StepReport::lag).
+  /// Lets a vertex follow a joint: a particle of 10 kg that keeps to the script as long as no force acts on
+  /// it. Contact can hold it back a little (StepReport::lag).
   void drive(std::uint32_t vertex, std::int32_t joint);
   void move(std::uint32_t vertex, const Eigen::Vector3d& by) { vertices_[vertex] += by; }
   /// Returns the mesh, with its edges, inner vertices, and no velocity.

@@ -34,15 +34,16 @@ struct SimulationResult : SavedState {
 /// Returns a number that changes with every bit of a state.
 std::uint64_t hash_of_state(const State& state);
 
-/// Runs a scene from its start, or from where a run with the same options and folder was saved last, to the
-/// given number of steps, or until `most_seconds` have passed, but for at least one step. The folder receives
+/// Runs a scene from its start, or from the last saved state of a run with the same options and folder, to
+/// the given number of steps, or until `most_seconds` have passed, but for at least one step. The folder
+/// receives
 ///   loop.jsonl      a line of JSON for the simulation, then one for each step (experiments/RESULTS.md)
 ///   loop.state      the state after the last saved step, replaced in one move
 ///   loop.recording  with `record`: see recording.hpp
 ///   frames/         with `frames_every`: see frames.hpp
-/// Lines and iterates after the last saved step are cut off before the run continues, so the files of a run
-/// that was killed and continued hold each step once, with the bits of a run that was not; times differ. (A
-/// strategy that promises no exact answers can find other pairs after it was continued.)
+/// Lines and iterates after the last saved step are cut off before the run continues. So the files of a run
+/// that was killed and continued hold each step once, with the bits of an uninterrupted run; times differ. (A
+/// strategy that promises no exact answers can find other pairs after a run was continued.)
 /// Calls done(record) after each step with its line. Throws io::InputError if a file cannot be read or
 /// written or belongs to a simulation with other options, and std::invalid_argument for options that name
 /// nothing; ConfigError as check_contact_strategy.

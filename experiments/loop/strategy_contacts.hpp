@@ -20,7 +20,7 @@ struct ContactStrategy {
   std::map<std::string, std::string> params{};  ///< its parameters, as text
 };
 
-/// Returns what a strategy of the registry says of itself. Throws ConfigError for an unknown id.
+/// Returns the registry's description of a strategy. Throws ConfigError for an unknown id.
 const Info& info_of(const std::string& id);
 
 /// Checks that a strategy can find the pairs of a simulation of this mesh. Throws ConfigError, in one

@@ -5,14 +5,14 @@
 
 namespace kbvh::experiments {
 
-/// A file or folder beside results.jsonl that a merge writes.
+/// A file or folder next to results.jsonl that a merge writes.
 struct PlannedFile {
   std::filesystem::path from;  ///< copied, unless there is `content`
   std::filesystem::path to;
   std::string content;
 };
 
-/// Plans what a merge does with the files of `folders` beside results.jsonl: rows of targets.json are added,
+/// Plans what a merge does with the files of `folders` next to results.jsonl: rows of targets.json are added,
 /// the pictures of scenes copied, and files of single commands (theory.json, stress.json, ccd.json,
 /// benchmark.json) copied, under a new number if `out` has another of the name. Adds a sentence to `notes`
 /// for each new number. Throws io::InputError for a targets.json that is no list of targets. Writes nothing.

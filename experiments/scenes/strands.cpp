@@ -122,7 +122,7 @@ class Curve {
       gone_[i] = gone_[i - 1] + length(points_[i] - points_[i - 1]);
   }
   double size() const { return gone_.back(); }
-  /// Returns the point at a length from the begin; straight on beyond the ends.
+  /// Returns the point at a length from the start; straight on beyond the ends.
   Vec at(double gone) const {
     const auto found = std::upper_bound(gone_.begin(), gone_.end(), gone) - gone_.begin();
     const auto i = std::size_t(std::clamp<std::ptrdiff_t>(found, 1, std::ptrdiff_t(gone_.size()) - 1));

@@ -65,7 +65,7 @@ ClipTimes play_frames(Session<S>& session, std::span<const double> frames, const
 }
 
 /// Does the same for the intervals between `knots`: ask(times, k) answers for the interval from knots[k] to
-/// knots[k + 1], and plans change at its begin.
+/// knots[k + 1], and plans change at its start.
 template <class S, class Ask>
 ClipTimes play_intervals(Session<S>& session, std::span<const double> knots, const PlanScript<S>* script,
                          const Ask& ask, const WarmUp* warm_up = nullptr) {

@@ -148,7 +148,7 @@ struct FrameQuery {
   }
 };
 
-/// Returns the first frame (or interval, by its begin) at or after the second knot of the overlaid plans;
+/// Returns the first frame (or interval, by its start) at or after the second knot of the overlaid plans;
 /// nothing for clips of fewer than three knots, and where plans change at run time.
 template <class S>
 std::optional<std::size_t> steady_frame(const Scene<S>& scene, std::span<const double> frames,

@@ -83,7 +83,7 @@ CurveRun measure_curves(const Scene<float>& scene) {
     for (const BoundNotice<float>& notice : log) {
       const std::size_t at = std::size_t(6) * notice.node + notice.side;
       Bound& bound = bounds[notice.body][at];
-      if (notice.begin != bound.segment) {  // of a curved body: the begin of the event's segment
+      if (notice.begin != bound.segment) {  // of a curved body: the start of the event's segment
         finish(notice.body, at);
         bound = {notice.begin, 0};
       }

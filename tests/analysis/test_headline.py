@@ -65,7 +65,7 @@ class TestHeadline(unittest.TestCase):
         table = headline.strategies(self.cases(records), headline.SHORT)
         row = next(row for row in self.rows(table) if row[0].startswith("automatic"))
         self.assertEqual(row[4], "2.00x ? [1.25–2.00]")
-        self.assertIn("1 disturbed clip of 7 (?): 9 involuntary switches, 30 a second.", table)
+        self.assertIn("1 of 7 contestants was disturbed (?), for example: 9 involuntary switches, 30 a second.", table)
         self.assertIn("the machine was quiet.", headline.strategies(self.cases(lines()), headline.SHORT))
 
     def test_a_peer_updates_by_its_best_and_queries_by_the_other_and_says_so(self) -> None:

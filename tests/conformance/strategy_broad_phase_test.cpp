@@ -227,7 +227,7 @@ TEST(StrategyBroadPhases, SayWhatTheyCannotDo) {
   build(broad, mesh, 0.1f);
   const auto fewer = MatrixView<float>::by_rows(mesh.v0.data(), mesh.vertex_count() - 1, 3);
   EXPECT_THROW(broad.update(fewer), std::invalid_argument);
-  // The end of a motion is checked, too, where it begins in the same memory as the begin.
+  // The end of a motion is checked, too, where it begins in the same memory as the start.
   EXPECT_THROW(broad.update(mesh.begin(), fewer), std::invalid_argument);
   broad.detect(CandidateKind::face_vertex, found);
   EXPECT_FALSE(found.empty());

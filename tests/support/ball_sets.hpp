@@ -10,7 +10,7 @@
 #include "core/scene/playback.hpp"
 #include "core/scene/probes.hpp"
 
-// Balls for tests: through the space of a scene, and such that vertices lie on their surfaces or just beside.
+// Balls for tests: through the space of a scene, and such that vertices lie on their surfaces or nearby.
 
 namespace kbvh::test {
 

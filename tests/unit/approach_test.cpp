@@ -189,7 +189,7 @@ TEST(Approaches, KnownTimesOfArrival) {
   moving.end[0][2] = 2;
   EXPECT_TRUE(checked(moving, 2).touches);  // at t = 1
   EXPECT_FALSE(checked(moving, std::nextafter(2.0, 0.0)).touches);
-  // The same beside a corner: a distance of 2 is never reached.
+  // The same next to a corner: a distance of 2 is never reached.
   moving.begin[0][0] = moving.end[0][0] = -0x1p-40;
   moving.begin[0][1] = moving.end[0][1] = -0x1p-40;
   EXPECT_FALSE(checked(moving, 2).touches);

@@ -72,7 +72,7 @@ TEST(CurvedBodies, FlightsDoNotDependOnKeyframes) {
   }
 }
 
-/// Returns the velocity of a curve at its begin, or at its end.
+/// Returns the velocity of a curve at its start, or at its end.
 double velocity(const CurvedPiece<double>& piece, bool at_end) {
   const double way = piece.x1 - piece.x0;
   return (at_end ? way - piece.bend - piece.twist : way + piece.bend) / (piece.t1 - piece.t0);

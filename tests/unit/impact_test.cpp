@@ -251,7 +251,7 @@ TEST(Impact, VertexAgainstFaceByHand) {
   EXPECT_FALSE(falls(std::nextafter(2.0, 3.0), 2).touches);
   EXPECT_FALSE(falls(-0x1p-1074, 2).touches);
   EXPECT_TRUE(falls(0x1p-1074, 2).touches);
-  // Exactly at the begin, exactly at the end, just short of it.
+  // Exactly at the start, exactly at the end, just short of it.
   const auto from_to = [](double begin, double end) {
     return checked_impact(vertex_face({1, 1, begin}, {1, 1, end}, floor_face, floor_face));
   };

@@ -1,5 +1,5 @@
 // Kinetic sorted lists and the set of overlapping boxes against comparing all boxes with all, on whole
-// numbers, so that many ends are equal at the begin, meet at one time, or stay together.
+// numbers, so that many ends are equal at the start, meet at one time, or stay together.
 
 #include <gtest/gtest.h>
 

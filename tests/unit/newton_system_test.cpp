@@ -1,5 +1,5 @@
-// The linear system of a simulation's step, against a dense one, and when it orders anew; the estimate of the
-// time that is left.
+// The linear system of a simulation's step, against a dense one, and when it orders again; the estimate of
+// the time that is left.
 #include "experiments/loop/newton_system.hpp"
 
 #include <gtest/gtest.h>

@@ -26,7 +26,7 @@ struct VertexBoxesJob {
   const S* grown_each;           ///< [vertex]: by this instead; null: all by `grown`
   S *begin_points, *end_points;  ///< [vertex][4]: written, the fourth number 0; the second may be null
   S* boxes;                      ///< [vertex][8]: written; lower x, y, z, unused, upper x, y, z, unused
-  const S* allowed;  ///< [vertex][8]: the boxes that may not be left; null: `boxes` are written instead
+  const S* allowed;  ///< [vertex][8]: boxes that must not be left; null: `boxes` are written instead
   // Written:
   bool inside;  ///< no box leaves its allowed one
   S room;       ///< smallest distance of a side from its allowed one, inwards; rounded to nearest
