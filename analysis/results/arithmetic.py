@@ -24,7 +24,7 @@ NAME = "libclip_times.so"
 SOURCES = (
     "analysis/results/clip_times.cpp", "experiments/study/raw_times.cpp", "experiments/study/raw_times.hpp",
     "experiments/study/best_refit.cpp", "experiments/study/best_refit.hpp", "experiments/study/resamples.hpp",
-    "experiments/study/chance.hpp", "core/judge/phase_times.hpp",
+    "experiments/study/chance.hpp", "core/base/median.hpp", "core/judge/phase_times.hpp",
 )  # fmt: skip
 FLAGS = ("-std=c++20", "-O2", "-ffp-contract=off", "-fPIC", "-shared")
 

@@ -8,6 +8,7 @@
 #include <optional>
 #include <span>
 
+#include "core/base/median.hpp"
 #include "experiments/cli/program.hpp"
 #include "experiments/common/output.hpp"
 #include "experiments/common/progress.hpp"
@@ -62,10 +63,7 @@ std::string ms_text(double ms) {
   return ms < 1000 ? fmt::format("{:.3g}", ms) : fmt::format("{:.0f}", ms);
 }
 std::string median_text(std::vector<double> list) {
-  if (list.empty()) return "-";
-  const auto middle = list.begin() + std::ptrdiff_t(list.size() / 2);
-  std::nth_element(list.begin(), middle, list.end());
-  return ms_text(*middle);
+  return list.empty() ? "-" : ms_text(median_of_times(list));
 }
 std::string mean_text(double sum, std::size_t steps) {
   return steps == 0 ? "-" : fmt::format("{:.4g}", sum / double(steps));

@@ -121,7 +121,7 @@ class Bench {
                 differs_ ? ", BATCHES DIFFER" : "");
     nlohmann::json rows = nlohmann::json::array();
     for (Contestant& contestant : contestants) {
-      const double median = micro::median_of(contestant.times);
+      const double median = median_of_times(contestant.times);
       contestant.per_second = median > 0 ? double(pairs.ids.size()) / median : 0;
       std::printf("  %-20s %12.4g per second  %8.2f ns each  %8llu touch\n", contestant.name.c_str(),
                   contestant.per_second, 1e9 * median / double(pairs.ids.size()),

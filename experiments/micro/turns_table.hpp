@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/median.hpp"
 #include "core/kernels/kernel_set.hpp"
 #include "experiments/common/environment.hpp"
 #include "experiments/common/machine.hpp"
@@ -23,13 +24,6 @@ namespace kbvh::experiments::micro {
 /// The processor's time of this program, which has one thread: other programs disturb it least.
 inline double milliseconds() {
   return 1e3 * double(std::clock()) / CLOCKS_PER_SEC;
-}
-
-/// Returns the median of at least one value, of an even number the mean of both in the middle. Sorts them.
-inline double median_of(std::vector<double>& values) {
-  std::sort(values.begin(), values.end());
-  const std::size_t half = values.size() / 2;
-  return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
 }
 
 /// Work that is timed by turns with its rivals.
@@ -102,7 +96,7 @@ class Table {
     nlohmann::json rows = nlohmann::json::array();
     double first = 0;
     for (Contestant& contestant : contestants) {
-      const double median = median_of(contestant.ms);
+      const double median = median_of_times(contestant.ms);
       if (first == 0) first = median;
       medians_[contestant.name] = median;
       std::printf("  %-56s %10.3f ms  %7.2f x  %zu pairs\n", contestant.name.c_str(), median, median / first,

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <tuple>
 
+#include "core/base/median.hpp"
 #include "experiments/study/chance.hpp"
 #include "experiments/study/resamples.hpp"
 
@@ -21,14 +22,6 @@ std::vector<Draw> resamples(std::size_t repetitions) {
   for (Draw& draw : all)
     for (std::uint32_t& one : draw) one = chance.below(repetitions);
   return all;
-}
-
-/// Returns the median, for an even number of values the mean of the two middle ones. Changes their order.
-double median_of(std::vector<double>& values) {
-  const auto half = values.begin() + std::ptrdiff_t(values.size() / 2);
-  std::nth_element(values.begin(), half, values.end());
-  if (values.size() % 2 == 1) return *half;
-  return 0.5 * (*std::max_element(values.begin(), half) + *half);
 }
 
 std::size_t begin_of(const RawTimes& times, Part part) {
@@ -48,11 +41,11 @@ std::vector<double> sums_by(const std::vector<std::vector<double>>& table, std::
     double sum = 0;
     if (by == By::clips) {
       for (std::size_t i = 0; i < draw.size(); ++i) values[i] = of_clips[draw[i]];
-      sum = median_of(values);
+      sum = median_of_times(values);
     } else {
       for (std::size_t f = begin; f < table[0].size(); ++f) {
         for (std::size_t i = 0; i < draw.size(); ++i) values[i] = table[draw[i]][f];
-        sum += median_of(values);
+        sum += median_of_times(values);
       }
     }
     sums.push_back(sum / frames);
@@ -63,7 +56,7 @@ std::vector<double> sums_by(const std::vector<std::vector<double>>& table, std::
 double median_sum(const std::vector<PhaseTimes>& sums, double PhaseTimes::*phase, const Draw& draw) {
   std::vector<double> values;
   for (const std::uint32_t r : draw) values.push_back(sums[r].*phase);
-  return median_of(values);
+  return median_of_times(values);
 }
 
 }  // namespace
@@ -236,7 +229,7 @@ std::optional<std::size_t> paid_from(const RawTimes& own, double own_preparation
   const auto at = [](const RawTimes& times, std::size_t f) {
     std::vector<double> values;
     for (const auto& frames : times.totals) values.push_back(frames[f]);
-    return median_of(values);
+    return median_of_times(values);
   };
   double ahead = other_preparation - own_preparation;
   std::optional<std::size_t> from;
