@@ -14,8 +14,8 @@ inline double median(std::vector<double>& sizes) {
   return *middle;
 }
 
-/// Returns the median of some times, of an even number the mean of the two in the middle. 0 for no times. Changes
-/// their order. O(n).
+/// Returns the median of some times, of an even number the mean of the two in the middle. 0 for no times.
+/// Changes their order. O(n).
 inline double median_of_times(std::vector<double>& times) {
   const double upper = median(times);
   if (times.size() % 2 == 1 || times.empty()) return upper;
