@@ -118,7 +118,7 @@ TEST(ConeCounts, BisectedPatchesHoldAtEveryFrame) {
 /// Certificates hold until they fail, and most of them no longer just after.
 TEST(ConeCounts, FailureTimesAreThoseOfTheCertificate) {
   std::uint64_t ended = 0, failed = 0;
-  for_cases([&](const Case& of) {
+  const auto check = [&](const Case& of) {
     ConeCounts counts;
     std::vector<CertifiedSpan> spans;
     count_events(of.patches, of.segment(), 1, counts, &spans);
@@ -135,7 +135,10 @@ TEST(ConeCounts, FailureTimesAreThoseOfTheCertificate) {
       ++ended;
       if (!holds_along(of.patches, of.segment().at(span.end + 1e-6), span.node, span.axis)) ++failed;
     }
-  });
+  };
+  for_cases(check);
+  for (const double from : {0.3, 0.8, 1.3})
+    for (const double to : {1.6, 2.0, 2.4, 3.0}) check(Case("further folds", 41, from, to));
   EXPECT_GT(ended, 3u);
   EXPECT_GT(2 * failed, ended);
 }
