@@ -82,19 +82,16 @@ typename PatchCertificate<S>::Moving PatchCertificate<S>::difference(std::uint32
 }
 
 template <class S>
-int PatchCertificate<S>::turn(const Axis& axis, const Moving& a, const Moving& b) {
-  ++work_.determinants;
+int PatchCertificate<S>::turn(const Axis& axis, const Moving& a, const Moving& b) const {
   const int first = determinant(axis, a.begin, b.begin).sign();
   if (end_ == nullptr) return common(first, first, first);
   if (first == undecided_sign) return 0;
-  work_.determinants += 3;
   const Sum middle = determinant(axis, a.begin, b.end) + determinant(axis, a.end, b.begin);
   return common(first, middle.sign(), determinant(axis, a.end, b.end).sign());
 }
 
 template <class S>
-bool PatchCertificate<S>::goes_on(const Axis& axis, const FaceSide& first, const FaceSide& second) {
-  ++work_.sides;
+bool PatchCertificate<S>::goes_on(const Axis& axis, const FaceSide& first, const FaceSide& second) const {
   const Moving a = difference(first.to, first.from), b = difference(second.to, second.from);
   if (turn(axis, a, b) != 0) return true;
   // Forwards: the product of the directions in the plane of projection is positive, also if that is scaled.
@@ -107,23 +104,17 @@ bool PatchCertificate<S>::goes_on(const Axis& axis, const FaceSide& first, const
     }
     return sum;
   };
-  ++work_.sides;
-  ++work_.determinants;
   const int at_begin = product(a.begin, b.begin).sign();
   if (at_begin != 1 || end_ == nullptr) return at_begin == 1;
-  work_.determinants += 3;
   return (product(a.begin, b.end) + product(a.end, b.begin)).sign() == 1 && product(a.end, b.end).sign() == 1;
 }
 
 template <class S>
-bool PatchCertificate<S>::apart(const Axis& axis, const FaceSide& a, const FaceSide& b) {
+bool PatchCertificate<S>::apart(const Axis& axis, const FaceSide& a, const FaceSide& b) const {
   const auto beside = [&](const FaceSide& line, const FaceSide& other) {
     const Moving along = difference(line.to, line.from);
-    ++work_.sides;
     const int side = turn(axis, along, difference(other.from, line.from));
-    if (side == 0) return false;
-    ++work_.sides;
-    return side == turn(axis, along, difference(other.to, line.from));
+    return side != 0 && side == turn(axis, along, difference(other.to, line.from));
   };
   return beside(a, b) || beside(b, a);
 }
@@ -171,16 +162,12 @@ bool PatchCertificate<S>::normals_agree(const ElementLeaves<S>& faces, std::uint
     for (std::uint32_t leaf = at.first_leaf; leaf < at.first_leaf + at.leaf_count; ++leaf) {
       const std::uint32_t* const corners = faces.corners + std::size_t(3) * leaf * padded;
       const std::uint32_t count = faces.end_entry[leaf] - faces.first_entry[leaf];
-      std::uint32_t lane = 0;
-      bool agree = true;
-      for (; lane < count && agree; ++lane) {
+      for (std::uint32_t lane = 0; lane < count; ++lane) {
         const std::uint32_t a = corners[lane], b = corners[padded + lane], c = corners[2 * padded + lane];
-        agree = end_ != nullptr ? turn(axis, difference(b, a), difference(c, a)) == 1
-                                : rest_sign(axis, point(a), point(b), point(c)) == 1;
+        if (end_ != nullptr ? turn(axis, difference(b, a), difference(c, a)) != 1
+                            : rest_sign(axis, point(a), point(b), point(c)) != 1)
+          return false;
       }
-      work_.faces += lane;
-      if (end_ == nullptr) work_.determinants += lane;
-      if (!agree) return false;
     }
     for (std::uint32_t c = 0; c < std::uint32_t(at.count - at.leaf_count); ++c)
       nodes_.push_back(at.first_child + c);
@@ -195,7 +182,6 @@ void PatchCertificate<S>::list_extents(std::span<const FaceSide> contour, const 
   const std::uint32_t origin = contour[0].from;
   points_.resize(contour.size());
   extents_.resize(contour.size());
-  work_.determinants += contour.size();
   for (std::size_t i = 0; i < contour.size(); ++i) {
     const Moving d = difference(contour[i].from, origin);
     for (int k = 0; k < 2; ++k) {
@@ -228,9 +214,7 @@ bool PatchCertificate<S>::contour_is_simple(std::span<const FaceSide> contour, c
     next_[end++] = std::uint32_t(begin);
     // A single loop winds around no point more than once, in whichever direction.
     const bool alone = begin == 0 && end == contour.size();
-    if (alone) continue;
-    work_.determinants += end - begin;
-    if (!turns_right(axis, contour.subspan(begin, end - begin)) && ++others > 1) return false;
+    if (!alone && !turns_right(axis, contour.subspan(begin, end - begin)) && ++others > 1) return false;
   }
   for (std::size_t i = 0; i < contour.size(); ++i)
     if (!goes_on(axis, contour[i], contour[next_[i]])) return false;
@@ -267,7 +251,6 @@ template <class S>
 bool PatchCertificate<S>::holds(const ElementLeaves<S>& faces, std::uint32_t padded, std::uint32_t node,
                                 std::span<const FaceSide> contour) {
   Axis axis;
-  work_.determinants += contour.size() * (end_ == nullptr ? 1 : 2);
   return find_axis(contour, axis) && normals_agree(faces, padded, node, axis) &&
          contour_is_simple(contour, axis);
 }

@@ -51,17 +51,6 @@ class PatchCertificate {
   /// magnitude of a component is 1. Returns false if the area is next to nothing.
   bool find_axis(std::span<const FaceSide> contour, Axis& axis) const;
 
-  /// Counts of what was decided since construction.
-  struct Work {
-    std::uint64_t faces = 0;  ///< signs of normals' components along an axis
-    std::uint64_t sides = 0;  ///< signs of two sides of a contour
-    /// Determinants axis . (a x b), of 9 multiplications each. A sign at rest takes one, in motion four, or
-    /// one if the first is uncertain. The axis, the area of a loop and an extent count as one for each side,
-    /// and so does a product of two projected sides.
-    std::uint64_t determinants = 0;
-  };
-  const Work& work() const { return work_; }
-
   std::size_t bytes() const;
 
  private:
@@ -74,18 +63,17 @@ class PatchCertificate {
   };
   Moving difference(std::uint32_t to, std::uint32_t from) const;
   /// Returns the sign of axis . (a x b) throughout the motion; 0 if it is not certain, or changes.
-  int turn(const Axis& axis, const Moving& a, const Moving& b);
+  int turn(const Axis& axis, const Moving& a, const Moving& b) const;
   /// Returns whether two consecutive sides do not overlap: the second one begins where the first one ends.
-  bool goes_on(const Axis& axis, const FaceSide& first, const FaceSide& second);
+  bool goes_on(const Axis& axis, const FaceSide& first, const FaceSide& second) const;
   /// Returns whether a line through one of two sides separates it from the other.
-  bool apart(const Axis& axis, const FaceSide& a, const FaceSide& b);
+  bool apart(const Axis& axis, const FaceSide& a, const FaceSide& b) const;
   bool turns_right(const Axis& axis, std::span<const FaceSide> loop) const;
   void list_extents(std::span<const FaceSide> contour, const Axis& axis);
 
   const S *begin_ = nullptr, *end_ = nullptr;
   std::vector<std::uint32_t> nodes_, next_;  // next_: [side] the side that begins where this one ends
   std::vector<Extent> points_, extents_;
-  Work work_;
 };
 
 extern template class PatchCertificate<float>;

@@ -27,8 +27,6 @@ class PatchCulling {
   /// Returns the number of patches tested, and of box tests.
   std::uint64_t patches() const { return patches_; }
   std::uint64_t box_tests() const { return box_tests_; }
-  /// Returns the counts of all runs' certificates.
-  const typename PatchCertificate<S>::Work& work() const { return certificate_.work(); }
   std::size_t bytes() const;
 
  private:
