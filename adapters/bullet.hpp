@@ -102,12 +102,8 @@ class LeafHits final : public btDbvt::ICollide {
 
  private:
   void take(std::uint32_t a, std::uint32_t b) {
-    if (within != nullptr) return take_within(a, b);
-    out->push_back({bodies.first, a, bodies.second, b});
-  }
-  /// Apart, so that pairs of two bodies, which are many, are not slowed by what pairs within one need.
-  [[gnu::noinline]] void take_within(std::uint32_t a, std::uint32_t b) {
-    if (keep_self_pair(within, LeavesOf::two, a, b)) out->push_back({bodies.first, a, bodies.second, b});
+    if (within == nullptr || keep_self_pair(within, LeavesOf::two, a, b))
+      out->push_back({bodies.first, a, bodies.second, b});
   }
 };
 

@@ -262,7 +262,7 @@ struct Halves {
     return {{part.begin, middle}, {middle, part.end}};
   }
   std::pair<std::uint32_t, std::uint32_t> leaf(std::uint32_t /*number*/, const Part& part,
-                                               std::uint32_t /*placed*/, std::uint32_t /*primitives*/) {
+                                               std::uint32_t /*placed*/) {
     return {part.begin, part.end - (shortened-- == 1 ? 1 : 0)};
   }
 };

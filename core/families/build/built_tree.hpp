@@ -74,7 +74,6 @@ struct Division {
   static constexpr std::uint32_t most = 8;
   std::array<Part, most> parts;
   std::array<double, most> weights;
-  std::array<std::uint32_t, most> sizes;  ///< primitives of the leaves
   std::uint32_t count = 0;
   std::uint32_t leaves = 0, primitives = 0;  ///< leaves among the children, and their primitives
   /// The numbers of the first leaf and of the first node among the children, and the number of primitives in
@@ -114,8 +113,7 @@ void divide(Source& source, std::uint32_t leaf_size, const Part& whole, Division
   for (std::uint32_t c = 0; c < to.count; ++c)
     if (to.weights[c] < 0) {
       ++to.leaves;
-      to.sizes[c] = source.size(to.parts[c]);
-      to.primitives += to.sizes[c];
+      to.primitives += source.size(to.parts[c]);
     }
 }
 
@@ -144,9 +142,9 @@ void write_children(BuiltTree<S>& tree, Source& source, std::uint32_t n, const D
   for (std::uint32_t c = 0; c < division.count; ++c) {
     const Part& part = division.parts[c];
     if (division.weights[c] < 0) {
-      const auto [begin, end] = source.leaf(leaf, part, placed, division.sizes[c]);
+      const auto [begin, end] = source.leaf(leaf, part, placed);
       tree.set_leaf(leaf++, begin, end);
-      placed += division.sizes[c];
+      placed += source.size(part);
     } else {
       parts[child++] = part;
     }
@@ -162,9 +160,8 @@ void write_children(BuiltTree<S>& tree, Source& source, std::uint32_t n, const D
 ///   weight(part)                of parts that are not leaves
 ///   split(part)                 the two children, as a std::pair
 ///   expect(leaves)              there will be this many leaves so far
-///   leaf(number, part, placed, primitives)
-///                               the range of entries of a leaf of so many primitives, as a std::pair;
-///                               `placed` is the number of primitives in the leaves before
+///   leaf(number, part, placed)  the range of entries of a leaf, as a std::pair; `placed` is the number of
+///                               primitives in the leaves before
 /// A part with a count of at most `leaf_size` is a leaf. `parts` is for temporary use. O(nodes).
 template <class S, class Source>
 void lay_out(BuiltTree<S>& tree, Source& source, const typename Source::Part& root,

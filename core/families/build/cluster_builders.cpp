@@ -31,10 +31,9 @@ struct ClusterSource {
   void expect(std::uint32_t count_of_leaves) const {
     if (leaves.size() < count_of_leaves) leaves.resize(count_of_leaves);
   }
-  std::pair<std::uint32_t, std::uint32_t> leaf(std::uint32_t number, Part part, std::uint32_t placed,
-                                               std::uint32_t primitives) const {
+  std::pair<std::uint32_t, std::uint32_t> leaf(std::uint32_t number, Part part, std::uint32_t placed) const {
     leaves[number] = {part, placed};
-    return {placed, placed + primitives};
+    return {placed, placed + size(part)};
   }
 };
 
@@ -289,10 +288,10 @@ struct BinnedSource {
   void expect(std::uint32_t count_of_leaves) const {
     if (leaves.size() < count_of_leaves) leaves.resize(count_of_leaves);
   }
-  std::pair<std::uint32_t, std::uint32_t> leaf(std::uint32_t number, const Part& part, std::uint32_t placed,
-                                               std::uint32_t primitives) const {
+  std::pair<std::uint32_t, std::uint32_t> leaf(std::uint32_t number, const Part& part,
+                                               std::uint32_t placed) const {
     leaves[number] = {part.begin, part.end, placed};
-    return {placed, placed + primitives};
+    return {placed, placed + size(part)};
   }
   std::pair<Part, Part> split(const Part& part) {
     BinsJob job{grains.boxes(),       items + part.begin, part.end - part.begin, {}, {},

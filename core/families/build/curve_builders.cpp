@@ -23,8 +23,7 @@ struct CellSource {
   static double weight(const Part& part) { return count(part); }
   static void expect(std::uint32_t /*leaves*/) {}
   static std::pair<std::uint32_t, std::uint32_t> leaf(std::uint32_t /*number*/, const Part& part,
-                                                      std::uint32_t /*placed*/,
-                                                      std::uint32_t /*primitives*/) {
+                                                      std::uint32_t /*placed*/) {
     return {part.begin, part.end};
   }
   std::pair<Part, Part> split(const Part& part) {
