@@ -108,6 +108,7 @@ class Game {
       offer.fixed = adversary_ == Adversary::random ? 100 * std::abs(random_.unit()) : 0;
       offer.change = i == 2 ? 50 * any(1) : 0;
       offer.whole = i >= joins ? segment_ : i == 3 ? 8 : 1;
+      offer.foreseen = i >= joins;
       offer.frames = i >= joins
                          ? (i == policy_.active() || left_in_segment_ == segment_ ? left_in_segment_ : 0)
                          : offer.whole;
@@ -302,6 +303,63 @@ TEST(ChoicePolicy, StopsAJoinAtTheRefitOfItsFrames) {
   // It is not tried again before the budget allows it.
   steady.play(50, 100, 300, 10, 1e9);
   EXPECT_LE(steady.policy.charges() - steady.policy.allowances(), share * steady.policy.all_work());
+}
+
+// What a refit would take rises with contacts, and with it what the incumbent may take.
+TEST(ChoicePolicy, AJoinIsNotStoppedBecauseContactsRiseWithinASegment) {
+  Steady steady(20);
+  steady.play(40, 100, 1e6, 30, 100);
+  ASSERT_EQ(steady.policy.incumbent(), 2u);
+  const int joined = steady.answered[2];
+  double contacts = 50;
+  for (int frame = 0; frame < 20; ++frame) {
+    contacts *= 1.15;
+    steady.play(1, 2 * contacts, 1e6, 1.5 * contacts, 100, contacts);
+  }
+  EXPECT_EQ(steady.answered[2] - joined, 20);
+  steady.play(20, 2 * contacts, 1e6, 3 * contacts, 100, contacts);
+  EXPECT_EQ(steady.policy.incumbent(), 0u) << "one that costs more is left all the same";
+}
+
+// A trial that was cheap says nothing once other observations have changed as much as contacts may.
+TEST(ChoicePolicy, AnOldCountIsNotBelievedAfterTheTreesHaveAged) {
+  for (const double aged : {0.0, 20.0}) {
+    ChoicePolicy policy(2, {});
+    policy.start_over();
+    policy.worked(100, 50);
+    std::vector<Offer> offers{{.expected = 100, .hoped = 50}, {.expected = 90, .hoped = 45}};
+    ASSERT_EQ(policy.next(offers), 1u);
+    policy.worked(105, 50);
+    ASSERT_EQ(policy.incumbent(), 0u);
+    policy.changed(aged);
+    offers[1] = {.expected = 5000, .hoped = 4000};
+    int trials = 0;
+    for (int frame = 0; frame < 200; ++frame) {
+      trials += policy.next(offers) == 1 ? 1 : 0;
+      policy.worked(policy.active() == 0 ? 1000 : 900, 50);
+    }
+    EXPECT_EQ(trials > 0, aged == 0) << aged;
+  }
+}
+
+// A join that was lost while its segments listed many pairs returns when the refit finds few.
+TEST(ChoicePolicy, AJoinReturnsWhenItsPredictionFalls) {
+  int frames_of_join[2];
+  for (const bool foreseen : {false, true}) {
+    Steady steady(10);
+    steady.offers[2].foreseen = foreseen;
+    steady.play(50, 100, 1e6, 10, 200);
+    EXPECT_EQ(steady.policy.incumbent(), 2u);
+    steady.play(100, 100, 1e6, 150, 500);
+    EXPECT_EQ(steady.policy.incumbent(), 0u);
+    const int before = steady.answered[2];
+    steady.offers[2].expected = 20;
+    steady.offers[2].hoped = 10;
+    steady.play(100, 100, 1e6, 10, 200);
+    frames_of_join[foreseen] = steady.answered[2] - before;
+  }
+  EXPECT_GT(frames_of_join[1], 80);
+  EXPECT_LT(frames_of_join[0], 40) << "without it, the count of a dear segment keeps it away";
 }
 
 TEST(ChoicePolicy, GoesBackToARefitThatCostsLessWhateverTheBudget) {

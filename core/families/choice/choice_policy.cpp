@@ -9,7 +9,7 @@ namespace {
 constexpr double unlimited = std::numeric_limits<double>::infinity();
 constexpr double frame_ages = 1.0 / 256;  ///< change of what is observed that a frame counts as
 constexpr double recent = 0.25;           ///< age up to which an estimate needs no trial
-constexpr double forgets = 4;             ///< change of contacts beyond which a prediction knows more
+constexpr double forgets = 4;             ///< change beyond which a prediction knows more
 constexpr double few_contacts = 16;       ///< below this many, changes of contacts count less
 constexpr int lasts = 32;                 ///< frames that a choice usually lasts, at least
 }  // namespace
@@ -18,7 +18,7 @@ void ChoicePolicy::start_over() {
   std::fill(candidates_.begin(), candidates_.end(), Candidate{});
   std::fill(offers_.begin(), offers_.end(), Offer{});
   active_ = incumbent_ = last_ = refit;
-  all_work_ = charged_ = allowances_ = paid_ = changes_ = 0;
+  all_work_ = charged_ = allowances_ = paid_ = changes_ = observed_ = 0;
   contacts_ = 1;
   found_ = -1;
   begin(refit, ChoiceState::stays);
@@ -32,7 +32,10 @@ double ChoicePolicy::estimate(std::size_t candidate) const {
   const double work = one.frame + one.search / std::max(1, offer.whole), fixed = std::min(offer.fixed, work),
                ratio = contacts_ / one.contacts;
   // With fewer contacts, the search becomes less of a work, but does not vanish.
-  return fixed + (work - fixed) * std::max(ratio, (1 + ratio) / 2);
+  double rest = std::max(ratio, (1 + ratio) / 2);
+  if (offer.foreseen && last_ == refit && one.predicted > 0)
+    rest = std::min(rest, std::max(0.0, offer.expected - offer.fixed) / one.predicted);
+  return fixed + (work - fixed) * rest;
 }
 
 /// Returns by what factor the number of contacts has changed since a candidate's work was counted, up or
@@ -62,6 +65,9 @@ void ChoicePolicy::worked(double work, double contacts) {
     contacts_ = std::clamp(contacts_ * (contacts + few_contacts) / (found_ + few_contacts), 1e-9, 1e9);
   found_ = contacts;
   last_ = active_;
+  refit_work_ += estimate(refit);
+  if (most_work_ < unlimited)
+    most_work_ = std::max(most_work_, refit_work_ + (left_ + more_frames()) * estimate(refit));
   if (state_ == ChoiceState::stopped) state_ = ChoiceState::stays;
   if (left_ <= 0)
     transition(Event::unit_done);
@@ -123,18 +129,16 @@ void ChoicePolicy::begin(std::size_t candidate, ChoiceState state) {
   active_ = candidate;
   left_ = std::max(1, offers_[candidate].frames);
   answered_ = 0;
-  unit_work_ = 0;
+  unit_work_ = refit_work_ = 0;
   most_work_ = most_charge_ = unlimited;
   if (state == ChoiceState::tries) {
     allowance_ = allowance(candidate);
     most_charge_ = settings_.budget * all_work_ - paid_ + allowance_;
-    // More than a refit would take is not worth its work, but a stopped frame has to be answered again.
-    if (candidate != refit) most_work_ = (left_ + 1) * estimate(refit);
     stay_ = estimate(incumbent_);
     candidates_[candidate].regret = 0;
-  } else if (candidate != refit && left_ > 1) {
-    most_work_ = left_ * estimate(refit);
   }
+  if (candidate != refit && (state == ChoiceState::tries || left_ > 1))
+    most_work_ = (left_ + more_frames()) * estimate(refit);
 }
 
 /// Takes what was counted as the active candidate's estimate.
@@ -144,6 +148,8 @@ void ChoicePolicy::learn(double frame, double search) {
   one.search = search;
   one.contacts = contacts_;
   one.changes = changes_;
+  one.observed = observed_;
+  one.predicted = offers_[active_].expected - offers_[active_].fixed;
   one.known = true;
   one.surplus = std::max(1.0, estimate(active_) / std::max(1e-9, offers_[active_].expected));
 }
@@ -188,7 +194,8 @@ std::size_t ChoicePolicy::challenger() {
     Candidate& one = candidates_[i];
     const Offer& offer = offers_[i];
     if (i == incumbent_ || offer.frames == 0) continue;
-    const bool counts = one.known && change_of_contacts(one) <= forgets;
+    const bool counts =
+        one.known && change_of_contacts(one) <= forgets && observed_ - one.observed <= forgets;
     // What was counted, and how it differed from its prediction, says less with time and other contacts.
     const double doubt = 1 + std::ldexp(changes_ - one.changes, -one.lost),
                  mistrust = 1 + (one.surplus - 1) / doubt * forgets / change_of_contacts(one),

@@ -10,12 +10,13 @@ namespace kbvh {
 
 /// What is known about a candidate before a frame. Work is in nanoseconds computed from counts.
 struct Offer {
-  double expected = 0;  ///< predicted work per frame, where no count is known
-  double hoped = 0;     ///< the same at best; at most `expected`
-  double fixed = 0;     ///< part of the work per frame that contacts do not change
-  double change = 0;    ///< what a change to it costs; 0 if it goes on from where it was
-  int frames = 1;       ///< frames that a unit would answer from this frame on; 0: it cannot begin now
-  int whole = 1;        ///< frames of a whole unit
+  double expected = 0;    ///< predicted work per frame, where no count is known
+  double hoped = 0;       ///< the same at best; at most `expected`
+  double fixed = 0;       ///< part of the work per frame that contacts do not change
+  double change = 0;      ///< what a change to it costs; 0 if it goes on from where it was
+  int frames = 1;         ///< frames that a unit would answer from this frame on; 0: it cannot begin now
+  int whole = 1;          ///< frames of a whole unit
+  bool foreseen = false;  ///< its estimate falls with `expected` while the refit answers
 };
 
 /// The state of a choice.
@@ -33,10 +34,12 @@ enum class ChoiceState : std::uint8_t {
 /// frame of a unit took beyond that, which the frames of a later unit share. While others answer, the part
 /// that depends on contacts follows their number, and the estimate becomes uncertain with the frames that
 /// pass and with every change of what is observed; half as fast after each trial in a row that the candidate
-/// lost. Once contacts have changed fourfold, a prediction replaces it, times what the last count was over
-/// its prediction. A challenger is tried when the work that it may have saved since its last trial, and may
-/// save in the frames that a choice usually lasts, equals what the trial and the change are expected to cost
-/// (ski rental), if the budget allows it.
+/// lost. Once contacts or other observations have changed fourfold, a prediction replaces it, times what the
+/// last count was over its prediction. What a join lists depends on its whole segment, of which the refit's
+/// counts tell more than contacts do: while the refit answers, its estimate falls with its prediction. A
+/// challenger is tried when the work that it may have saved since its last trial, and may save in the frames
+/// that a choice usually lasts, equals what the trial and the change are expected to cost (ski rental), if
+/// the budget allows it.
 ///
 /// The budget. Let W be all work counted since `start_over`. The charge of a trial is its work so far, minus
 /// `stay_estimate` for each frame that it has answered, but at least 0. Each candidate has one allowance for
@@ -52,7 +55,7 @@ enum class ChoiceState : std::uint8_t {
 ///
 /// Return to a refit. At the end of a unit the incumbent's own count replaces its estimate; if that exceeds
 /// the refit's, the refit becomes the incumbent, whatever the budget is. Within a unit of several frames the
-/// incumbent stops when it has taken the refit's estimate for all of them.
+/// incumbent stops when it has taken the refit's estimate for all of them, which rises with contacts.
 class ChoicePolicy {
  public:
   struct Settings {
@@ -81,7 +84,10 @@ class ChoicePolicy {
   /// candidate that answers this frame instead, without a limit; `worked` then follows.
   std::size_t stopped(double work);
   /// Registers a change of what is observed, relative to its former amount: 1 if it has doubled.
-  void changed(double share) { changes_ += share; }
+  void changed(double share) {
+    changes_ += share;
+    observed_ += share;
+  }
 
   std::size_t active() const { return active_; }
   std::size_t incumbent() const { return incumbent_; }
@@ -104,14 +110,16 @@ class ChoicePolicy {
 
  private:
   struct Candidate {
-    double frame = 0;     ///< work of a usual frame of its last unit
-    double search = 0;    ///< what the unit's first frame took beyond that
-    double contacts = 1;  ///< `contacts_` at that time
-    double changes = 0;   ///< `changes_` at that time
-    double surplus = 1;   ///< the unit's work over its prediction, if it was more
-    double regret = 0;    ///< work that it may have saved since its last trial
-    int lost = 0;         ///< trials in a row that it lost
-    bool known = false;   ///< has answered a unit
+    double frame = 0;      ///< work of a usual frame of its last unit
+    double search = 0;     ///< what the unit's first frame took beyond that
+    double contacts = 1;   ///< `contacts_` at that time
+    double changes = 0;    ///< `changes_` at that time
+    double observed = 0;   ///< `observed_` at that time
+    double predicted = 0;  ///< what was expected of it then, without the fixed part
+    double surplus = 1;    ///< the unit's work over its prediction, if it was more
+    double regret = 0;     ///< work that it may have saved since its last trial
+    int lost = 0;          ///< trials in a row that it lost
+    bool known = false;    ///< has answered a unit
     bool allowance_is_free = true;
   };
   enum class Event : std::uint8_t { unit_due, unit_done, limit_reached };
@@ -127,6 +135,8 @@ class ChoicePolicy {
   /// Returns the work that the unit may have done; in a trial, each frame answered adds what staying costs.
   double most_work() const { return std::min(most_work_, most_charge_ + stay_ * answered_); }
   double change_of_contacts(const Candidate& candidate) const;
+  /// Returns the frames whose work a refit would have to do again after a trial that is stopped.
+  int more_frames() const { return state_ == ChoiceState::tries ? 1 : 0; }
 
   Settings settings_;
   std::vector<Candidate> candidates_;
@@ -135,10 +145,12 @@ class ChoicePolicy {
   std::size_t active_ = refit, incumbent_ = refit, last_ = refit;
   int left_ = 0, answered_ = 0;  ///< frames of the unit
   double unit_work_ = 0, first_work_ = 0, most_work_ = 0, most_charge_ = 0;
+  double refit_work_ = 0;            ///< what a refit would have taken for the frames that are answered
   double stay_ = 0, allowance_ = 0;  ///< of the last trial
   double all_work_ = 0, charged_ = 0, allowances_ = 0, paid_ = 0;
-  double found_ = -1;                  ///< contacts of the last frame
-  double contacts_ = 1, changes_ = 0;  ///< relative number of contacts; other changes, and frames
+  double found_ = -1;                   ///< contacts of the last frame
+  double contacts_ = 1, observed_ = 0;  ///< relative number of contacts; other changes
+  double changes_ = 0;                  ///< other changes, and frames
 };
 
 }  // namespace kbvh
