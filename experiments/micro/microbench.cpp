@@ -3,8 +3,11 @@
 // measures clips.
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <random>
+#include <span>
 
 #include "core/families/events/event_queue.hpp"
 #include "core/families/events/segment_queue.hpp"
@@ -129,8 +132,8 @@ std::vector<Ray<float>> rays_at_a_sheet(RayOrder order) {
   return rays;
 }
 
-/// The closest hits of rays on a sheet of 64,800 triangles.
-void closest_hits(benchmark::State& state, RayOrder order, KernelSet kernels) {
+/// The closest hits of rays on a sheet of 64,800 triangles, asked for `at_once` at a time.
+void closest_hits(benchmark::State& state, RayOrder order, std::size_t at_once, KernelSet kernels) {
   Scene<float> scene;
   scene.bodies.push_back(sheet(180, 0, 1));
   const SceneView<float> view(scene);
@@ -144,7 +147,13 @@ void closest_hits(benchmark::State& state, RayOrder order, KernelSet kernels) {
   TriangleTestStats stats;
   std::uint64_t tests = 0;
   const auto side_of = [&](std::uint32_t body) -> WideSide<float> { return {&hierarchy, body}; };
-  for (auto _ : state) probes.answer(RayProbes<float>{RayQuery::closest, rays, hits}, side_of, stats, tests);
+  for (auto _ : state)
+    for (std::size_t begin = 0; begin < rays.size(); begin += at_once) {
+      const std::size_t count = std::min(at_once, rays.size() - begin);
+      probes.answer(
+          RayProbes<float>{RayQuery::closest, std::span(rays).subspan(begin, count), {&hits[begin], count}},
+          side_of, stats, tests);
+    }
   report_each(state, double(rays.size()), "ray");
 }
 
@@ -251,9 +260,12 @@ void register_all() {
     RegisterBenchmark(("overlap/" + set).c_str(), [=](benchmark::State& state) { overlap(state, kernels); });
     for (const auto& [order, word] :
          {std::pair(RayOrder::rows, "rows"), {RayOrder::tiles, "tiles"}, {RayOrder::random, "random"}})
-      RegisterBenchmark(
-          ("rays/" + set + "/" + word).c_str(),
-          [order = order, kernels](benchmark::State& state) { closest_hits(state, order, kernels); });
+      for (const auto& [at_once, how] :
+           {std::pair<std::size_t, const char*>(1, "/1 at a time"), {64, "/64 at a time"}, {1U << 20, ""}})
+        RegisterBenchmark(("rays/" + set + "/" + word + how).c_str(),
+                          [order = order, at_once = at_once, kernels](benchmark::State& state) {
+                            closest_hits(state, order, at_once, kernels);
+                          });
   }
   for (const BuildMethod method : {BuildMethod::median, BuildMethod::sah, BuildMethod::morton})
     RegisterBenchmark((std::string("build/") + name(method)).c_str(),
