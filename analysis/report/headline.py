@@ -4,13 +4,12 @@ usage: headline.py RESULTS_DIR [--write PAGE]... [--picture FILE.png]
 
 A page has tables between `<!-- headline NAME -->` and `<!-- /headline NAME -->`; NAME is one of TABLES. Without --write all of
 them are printed. Every number is a median over repetitions, in ms per frame of the clip; every ratio is against the best refit
-of its own table. Scenes that `auto` was tuned on are those of the studies "tuned on" of experiments/plans/auto.json.
+of its own table.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import re
 import sys
 import tempfile
@@ -23,12 +22,11 @@ import pandas as pd
 from figures import canvas, figures
 from figures.colours import looks
 from ratios import ratios
-from results import files, text
+from results import files, text, tuned
 from results.load import ResultError, Study, load
 
-AUTO_PLAN = Path(__file__).resolve().parents[2] / "experiments" / "plans" / "auto.json"
 CLOTH = "tablecloth 16k"  #: the scene of the tables of strategies
-TUNED, PEER = "†", "‡"  #: marks: auto was tuned on the scene; of the two configurations of a peer
+PEER = "‡"  #: marks the two configurations of a peer
 
 
 @dataclass(frozen=True)
@@ -129,12 +127,6 @@ def cases(study: Study) -> list[Case]:
     return [Case(study, rows) for _, rows in timed.groupby("group", sort=False)]
 
 
-def tuned_scenes(plan: Path = AUTO_PLAN) -> set[str]:
-    """Returns the names of the scenes that `auto` was tuned on."""
-    studies = json.loads(plan.read_text(encoding="utf-8"))["studies"]
-    return {scene["name"] for study in studies if study["name"].startswith("tuned on") for scene in study["scenes"]}
-
-
 def share(run: pd.Series, column: str) -> str:
     """Formats the share of a frame, positions included, that one column takes."""
     return f"{100 * run[column] / run['total_motion']:.0f} %"
@@ -196,12 +188,12 @@ def strategies(all_cases: list[Case], rows: list[Contestant]) -> str:
                 f"{PEER} {run['title']}, {run['version'] or 'of unknown version'}: {run['remark']}. With the update shown, a clip would be {whole}x."
             )
         version = f" ({run['version']})" if run["version"] and other is None else ""
-        tuned = f" {TUNED}" if who.id == "auto" and case.scene in tuned_scenes() else ""
-        cells = [who.words + version + mark + tuned, text.milliseconds(updating), text.milliseconds(run["query"]),
+        tuned_mark = tuned.mark(who.id, case.scene)
+        cells = [who.words + version + mark + tuned_mark, text.milliseconds(updating), text.milliseconds(run["query"]),
                  text.milliseconds(run["motion"]) if run["motion"] > 0 else "fetched", f"{case.ratio(run)}"]  # fmt: skip
         lines.append((ratios.clip_total(case.study, int(run["run"])), _row(cells)))
-        if tuned:
-            remarks.append(f"{TUNED} `auto` was tuned on this scene; the table of cases has some that it was not.")
+        if tuned_mark:
+            remarks.append(f"{tuned.MARK} `auto` was tuned on this scene; the table of cases has some that it was not.")
     head = ["strategy", "update", "query", "positions", "clip: times as fast as the best refit (95 % interval)"]
     table = [_row(head), _row(["---"] * len(head)), *(line for _, line in sorted(lines, key=lambda line: line[0]))]
     return "\n".join([*table, "", " ".join([*dict.fromkeys(remarks), facts([case])])]) + "\n"
@@ -223,7 +215,6 @@ def picture(all_cases: list[Case], path: Path) -> None:
 
 def by_case(all_cases: list[Case]) -> str:
     """Returns the table of scenes and l: the best refit, its shares, and the others against it."""
-    tuned = tuned_scenes()
     head = ["scene", "l", "best refit", "ms", "update", "query", *(who.words.split(" (")[0].split(",")[0] for who in CASES)]
     lines = [_row(head), _row(["---"] * len(head))]
     for case in all_cases:
@@ -233,13 +224,12 @@ def by_case(all_cases: list[Case]) -> str:
                  share(case.refit, "updating"), share(case.refit, "query")]  # fmt: skip
         for who in CASES:
             run = case.run(who)
-            mark = f" {TUNED}" if run is not None and who.id == "auto" and case.scene in tuned else ""
-            cells.append(text.MISSING if run is None else case.ratio(run) + mark)
+            cells.append(text.MISSING if run is None else case.ratio(run) + tuned.mark(who.id, case.scene))
         lines.append(_row(cells))
     said = (
         f"ms: a frame of the best refit, positions included; update and query: their shares of it. The other columns: times as fast as the best "
         f"refit, over the whole clip (95 % interval); Embree by user geometry, the only one that it can collide, whose refit calls back for each "
-        f"primitive. {TUNED}: `auto` was tuned on the scene. {text.MISSING}: not measured on this scene."
+        f"primitive. {tuned.MARK}: `auto` was tuned on the scene. {text.MISSING}: not measured on this scene."
     )
     return "\n".join([*lines, "", f"{said} {facts(all_cases)}"]) + "\n"
 

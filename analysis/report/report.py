@@ -137,6 +137,7 @@ def write(
         break_even=_break_even(study, claims, all_looks, folder / "figures", which),
         targets=targets,
         targets_facts=targets_table.facts(list(targets)) if targets else "",
+        targets_remark=targets_table.remark(targets).replace("`", ""),
         verdicts=targets_table.VERDICTS,
         times=targets_table.times,
         wanted=targets_table.wanted,

@@ -11,9 +11,9 @@ import json
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Optional
+from typing import Any, Optional, Sequence
 
-from results import files, text
+from results import files, text, tuned
 from results.load import ResultError
 
 SCHEMA = 2
@@ -46,6 +46,7 @@ class Scene:
     denominator: str
     denominator_ms: Optional[float]
     reason: str
+    tuned: str  #: " †" for a ratio of `auto` on a scene that it was tuned on
 
 
 @dataclass(frozen=True)
@@ -127,6 +128,7 @@ def _target(row: dict[str, Any]) -> Target:
 
 def _scene(one: dict[str, Any]) -> Scene:
     above, below = one["numerator"] or {}, one["denominator"] or {}
+    marks = [tuned.mark(side["label"].split(" ")[0], str(one["scene"])) for side in (above, below) if side and one["ratio"] is not None]
     return Scene(
         name=str(one["scene"]),
         order=one["order"] or "",
@@ -140,6 +142,7 @@ def _scene(one: dict[str, Any]) -> Scene:
         denominator=below.get("label", ""),
         denominator_ms=_number(below, "ms") if below else None,
         reason=one.get("reason", ""),
+        tuned=max(marks, default=""),
     )
 
 
@@ -186,6 +189,11 @@ def facts(targets: list[Target]) -> str:
     return sentence
 
 
+def remark(targets: Sequence[Target]) -> str:
+    """Explains the mark of scenes that `auto` was tuned on; empty if no ratio has it."""
+    return f"{tuned.MARK}: `auto` was tuned on the scene." if any(scene.tuned for target in targets for scene in target.scenes) else ""
+
+
 def columns(targets: list[Target]) -> list[str]:
     """Returns the names of all scenes, in the order of measurement."""
     return list(dict.fromkeys(scene.name for target in targets for scene in target.scenes))
@@ -209,14 +217,17 @@ def markdown(targets: list[Target]) -> str:
         "or the least of them, as the plan says. The verdict compares this number, not its interval; the table below has "
         "every scene, in bold if it counts, with ? if the machine was disturbed. A range is over fewer than five repetitions."
     )
-    lines += ["", f"{facts(targets)} {meaning}", ""]
+    lines += ["", f"{facts(targets)} {meaning} {remark(targets)}".rstrip(), ""]
     lines += [_row(["what", *names]), _row(["---"] * (1 + len(names)))]
     for target in targets:
-        cells = {scene.name: times(scene.ratio) + ("?" if scene.disturbed else "") for scene in target.scenes}
-        counted = {scene.name for scene in target.scenes if scene.counts}
-        shown = [f"**{cells[name]}**" if name in counted else cells.get(name, text.MISSING) for name in names]
-        lines.append(_row([target.what, *shown]))
+        cells = {scene.name: _cell(scene) for scene in target.scenes}
+        lines.append(_row([target.what, *(cells.get(name, text.MISSING) for name in names)]))
     return "\n".join(lines) + "\n"
+
+
+def _cell(scene: Scene) -> str:
+    ratio = times(scene.ratio) + ("?" if scene.disturbed else "")
+    return (f"**{ratio}**" if scene.counts else ratio) + scene.tuned
 
 
 def _row(cells: list[str]) -> str:

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "experiments/cli/commands.hpp"
 #include "experiments/cli/options.hpp"
@@ -12,6 +14,7 @@
 #include "experiments/common/text.hpp"
 #include "experiments/io/bytes.hpp"
 #include "experiments/io/obj.hpp"
+#include "experiments/scenes/builtin_scenes.hpp"
 #include "experiments/scenes/lab_scene.hpp"
 #include "experiments/scenes/scene_card.hpp"
 
@@ -62,6 +65,18 @@ bool ends_in(const SceneOptions& options, const char* extension) {
   return std::filesystem::path(options.out).extension() == extension;
 }
 
+/// Rejects options that change nothing in the scene.
+void check_options(const BuiltinScene& scene, const BuiltinOptions& options) {
+  if (options.obstacle_triangles > 0 && scene.bodies == BodiesOf::one)
+    throw io::InputError("--obstacle: the scene '" + scene.name + "' has one body");
+  if (options.full_triangles == 0 || scene.levels == ClothLevels::two) return;
+  std::vector<std::string> garments;
+  for (const BuiltinScene& other : builtin_scenes())
+    if (other.levels == ClothLevels::two) garments.push_back(other.name);
+  throw io::InputError("--full-triangles: is for " + joined(garments, " and ") + ", not for '" + scene.name +
+                       "'");
+}
+
 /// Rejects a --frame that no file would show.
 void check_frame(const LoadedScene& scene, const SceneOptions& options) {
   if (options.frame == 0) return;
@@ -106,8 +121,10 @@ void print_cards(const std::vector<BodyCard>& list) {
 }
 
 int show(const SceneOptions& options) {
+  const BuiltinScene& builtin = find_builtin_scene(options.name);
+  check_options(builtin, options.scene);
   SceneSpec spec;
-  spec.builtin = find_builtin_scene(options.name).name;
+  spec.builtin = builtin.name;
   spec.options = options.scene;
   Progress line;
   const LoadedScene scene = load(spec, [&](const std::string& what, double fraction) {
@@ -138,8 +155,9 @@ void add_scene(CLI::App& program, Action& action) {
             "triangles of the other body");
   add_whole(*command, "--keyframes", o->scene.keyframes, {1, ranges::keyframes.most}, "(60)");
   add_whole(*command, "--seed", o->scene.seed, ranges::any, "seed of random choices (1)");
-  add_whole(*command, "--full-triangles", o->scene.full_triangles, ranges::triangles,
-            "garments: largest number of triangles simulated in full; above it, a second level refines");
+  add_whole(
+      *command, "--full-triangles", o->scene.full_triangles, ranges::triangles,
+      "shirt and dress: largest number of triangles simulated in full; above it, a second level refines");
   add_whole(*command, "--frame", o->frame, ranges::any, "keyframe of the OBJ file, from 0");
   add_text(*command, "--out", o->out, "OBJ file, JSON file or folder to write");
   command->add_flag("--json", o->as_json, "for programs");

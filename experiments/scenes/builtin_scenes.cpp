@@ -233,8 +233,10 @@ Meshes funnel_cloth(const BuiltinOptions& options, const MakeProgress&) {
 const std::vector<BuiltinScene>& builtin_scenes() {
   static const std::vector<BuiltinScene> list{
       {"tablecloth", "a cloth, simulated, falls onto a round table and hangs over its rim", &tablecloth},
-      {"shirt", "a walking man and his shirt, simulated", &shirt},
-      {"dress", "a walking woman and her dress, simulated", &dress},
+      {"shirt", "a walking man and his shirt, simulated", &shirt, nullptr, BodiesOf::several, nullptr,
+       ClothLevels::two},
+      {"dress", "a walking woman and her dress, simulated", &dress, nullptr, BodiesOf::several, nullptr,
+       ClothLevels::two},
       {"waving_sheet", "a sheet in crossing waves cuts a sphere at rest", &waving_sheet},
       {"expanding_sphere", "a growing sphere reaches a sphere at rest", &expanding_sphere},
       {"reversing_spheres",

@@ -50,6 +50,12 @@ enum class BodiesOf : std::uint8_t {
   one,      ///< the scene has one body: pairs within it; the option `obstacle` is refused
 };
 
+/// Which simulations of cloth a scene has.
+enum class ClothLevels : std::uint8_t {
+  one,  ///< at most one, of all triangles; the option `full_triangles` is refused
+  two,  ///< above `full_triangles` a second one refines the first
+};
+
 /// A scene that needs no files.
 struct BuiltinScene {
   std::string name;
@@ -60,6 +66,7 @@ struct BuiltinScene {
   BodiesOf bodies = BodiesOf::several;
   /// Does the same for scenes with a dragged part, as a function of the generated bodies.
   DragRule (*drag)(const BuiltinOptions& options, const std::vector<io::AnimatedMesh>& meshes) = nullptr;
+  ClothLevels levels = ClothLevels::one;
 
   /// Returns whether the scene makes its own changes of plans, and defines its frames.
   bool changes_plans() const { return reversal != nullptr || drag != nullptr; }

@@ -11,7 +11,7 @@ import paths  # noqa: F401  (finds the modules under test)
 import synthetic
 
 from report import headline
-from results import load
+from results import load, tuned
 from results.load import ResultError
 
 
@@ -76,12 +76,12 @@ class TestHeadline(unittest.TestCase):
 
     def test_cases_mark_what_auto_was_tuned_on(self) -> None:
         table = headline.by_case(self.cases(lines()))
-        tuned, new = self.rows(table)
-        self.assertEqual(tuned[:6], [headline.CLOTH, "10", "`bottom_up`", "10.0", "10 %", "80 %"])
-        self.assertEqual(tuned[6], "2.00x †")
+        known, new = self.rows(table)
+        self.assertEqual(known[:6], [headline.CLOTH, "10", "`bottom_up`", "10.0", "10 %", "80 %"])
+        self.assertEqual(known[6], "2.00x †")
         self.assertEqual(new[:3] + new[6:8], ["new scene", "1", "`leaf_slabs`", "0.50x", "–"])
-        self.assertIn(headline.CLOTH, headline.tuned_scenes())
-        self.assertNotIn("sheet over box 10k", headline.tuned_scenes())
+        self.assertIn(headline.CLOTH, tuned.scenes())
+        self.assertNotIn("sheet over box 10k", tuned.scenes())
 
     def test_says_how_many_frames_were_compared_and_what_was_found(self) -> None:
         self.assertIn("22 frames were compared with the oracle, each for every contestant (99 comparisons): no pair was missed",

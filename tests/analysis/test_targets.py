@@ -15,6 +15,7 @@ import shared
 import synthetic
 
 from report import report, targets_table
+from results import tuned
 
 
 def scene(name: str, ratio: Optional[float], counts: bool, **others: Any) -> dict[str, Any]:
@@ -102,6 +103,22 @@ class TestMarkdown(TargetsCase):
         self.assertIn("| refit over FCL | 45.2x [40.0–50.0] | 20x |", out)
         self.assertIn("| refit over FCL | 12.0x? | **45.2x** | – |", out)
 
+    def test_ratios_of_auto_are_marked_where_it_was_tuned(self) -> None:
+        self.assertNotIn("†", self.run_main(rows())[1])
+        auto = {"label": "auto [bounds=triangles]", "ms": 2.0, "repetitions": 5, "run": "r"}
+        names = {"tablecloth 16k": 2.0, "tablecloth 16k (changes of pairs)": 3.0, "sheet over box 10k": 4.0, "dress 65k": None}
+        scenes = [scene(name, ratio, "changes" not in name, denominator=auto) for name, ratio in names.items()]
+        code, out, _ = self.run_main([target("auto", 2.0, "missed", scenes), target("join", 2.0, "missed", [scene("tablecloth 16k", 5.0, True)])])
+        self.assertEqual(code, 0)
+        self.assertIn("| auto | **2.00x** † | 3.00x † | **4.00x** | **–** |", out)
+        self.assertIn("| join | **5.00x** | – | – | – |", out)
+        self.assertIn(" five repetitions. †: `auto` was tuned on the scene.\n", out)
+
+    def test_an_installed_analysis_finds_the_plan_auto(self) -> None:
+        (self.folder / "plans").mkdir()
+        (self.folder / "plans" / "auto.json").write_text('{"studies": [{"name": "tuned on", "scenes": [{"name": "a"}]}, {"name": "unseen"}]}', encoding="utf-8")
+        self.assertEqual(tuned.scenes(self.folder), {"a"})
+
 
 class TestWrite(TargetsCase):
     def test_only_what_is_between_the_markers_changes(self) -> None:
@@ -179,6 +196,16 @@ class TestReport(TargetsCase):
         code, page = self.page()
         self.assertEqual(code, 0)
         self.assertNotIn('id="targets"', page)
+
+    def test_ratios_of_auto_are_marked_where_it_was_tuned(self) -> None:
+        auto = {"label": "auto", "ms": 2.0, "repetitions": 5, "run": "r"}
+        for label, marked in (("auto", True), ("front", False)):
+            one = scene("tablecloth 16k", 2.0, True, denominator=dict(auto, label=label))
+            self.file.write_text(json.dumps([target("a", 2.0, "missed", [one])]), encoding="utf-8")
+            code, page = self.page()
+            self.assertEqual(code, 0)
+            self.assertEqual("2.00x † <span" in page, marked)
+            self.assertEqual("†: auto was tuned on the scene." in page, marked)
 
     def test_a_wrong_file_is_refused(self) -> None:
         self.file.write_text("[3]", encoding="utf-8")

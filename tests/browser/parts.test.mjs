@@ -77,7 +77,6 @@ test('a tree knows its children, levels and vertices; samples keep what must be 
   assert.deepEqual(tree.verticesBelow(1), [3, 4, 5]);
   assert.deepEqual(tree.verticesBelow(2), [0, 1, 2, 3]);
   assert.deepEqual(tree.pathUp(4), [4, 2, 0]);
-  assert.deepEqual(tree.leavesOf(1), [3, 4]);
   assert.equal(tree.next({ ...flat }, info).childStart, tree.childStart, 'an unchanged structure is shared');
   assert.notEqual(tree.next({ ...flat, primitives: Uint32Array.of(0, 1, 2) }, info).childStart, tree.childStart);
   const scene = { bodies: [{ times: [0], positions: [Array.from({ length: 18 }, (_, i) => i)] }] };

@@ -86,11 +86,4 @@ export function eventTime(event) {
   return crossingTime(event.winnerPiece, event.loserPiece);
 }
 
-/** "4/3 s exactly" or "1.33333 s". */
-export function timeText(event) {
-  const t = eventTime(event);
-  if (t) { const s = spell(t); return s.exactly ? `${s.text} s exactly` : `${s.text} s`; }
-  return `${short(event.time)} s`;
-}
-
 function gcd(a, b) { while (b) [a, b] = [b, a % b]; return a; }

@@ -76,14 +76,6 @@ export class Tree {
     return path;
   }
 
-  /** Leaves whose primitives use a vertex. */
-  leavesOf(vertex) {
-    const leaves = [];
-    for (let node = 0; node < this.size; ++node)
-      if (this.isLeaf(node) && this.verticesBelow(node).includes(vertex)) leaves.push(node);
-    return leaves;
-  }
-
   /** Surface (or, in the plane, half the circumference) of a node's box. */
   extent(node) {
     const d = [0, 1, 2].map((a) => this.bounds[6 * node + 3 + a] - this.bounds[6 * node + a]);

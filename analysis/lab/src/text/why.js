@@ -166,9 +166,3 @@ function pairStory(step, {bodies, trees}) {
       return [{heading: 'What happens', parts: ['The strategy chooses again which pairs it watches: this', ...at]}];
   }
 }
-
-/** Plain text of a story's parts, for screen readers and copies. */
-export function plainText(paragraphs) {
-  return paragraphs.map(({heading, parts}) => `${heading}: ` + parts.map((part) =>
-      typeof part === 'string' ? part : part.vertex !== undefined ? `vertex ${part.vertex}` : part.node !== undefined ? `node ${part.node}` : part.text).join('')).join('\n');
-}
