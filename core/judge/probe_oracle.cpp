@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <iterator>
 #include <limits>
+#include <string>
 #include <type_traits>
 #include <vector>
 
 #include "core/judge/polygon_region.hpp"
+#include "core/motion/admissible.hpp"
 #include "core/scene/distance_comparison.hpp"
 
 namespace kbvh {
