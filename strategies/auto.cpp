@@ -316,7 +316,7 @@ class Auto final : public OneOfMany<S>,
       offer.fixed = joins ? one.frame + (one.update(seen_) - one.frame) / offer.whole : one.update(seen_);
       offer.change = this->goes_on(i) ? 0 : ChoicePrices::start * primitives_ + one.build * seen_.primitives;
       const auto [expected, hoped] = one.predict(seen_, one);
-      offer.foreseen = joins;
+      offer.follows_prediction = joins;
       offer.expected = expected;
       offer.hoped = hoped;
     }

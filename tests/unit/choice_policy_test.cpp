@@ -108,7 +108,7 @@ class Game {
       offer.fixed = adversary_ == Adversary::random ? 100 * std::abs(random_.unit()) : 0;
       offer.change = i == 2 ? 50 * any(1) : 0;
       offer.whole = i >= joins ? segment_ : i == 3 ? 8 : 1;
-      offer.foreseen = i >= joins;
+      offer.follows_prediction = i >= joins;
       offer.frames = i >= joins
                          ? (i == policy_.active() || left_in_segment_ == segment_ ? left_in_segment_ : 0)
                          : offer.whole;
@@ -345,9 +345,9 @@ TEST(ChoicePolicy, AnOldCountIsNotBelievedAfterTheTreesHaveAged) {
 // A join that was lost while its segments listed many pairs returns when the refit finds few.
 TEST(ChoicePolicy, AJoinReturnsWhenItsPredictionFalls) {
   int frames_of_join[2];
-  for (const bool foreseen : {false, true}) {
+  for (const bool follows : {false, true}) {
     Steady steady(10);
-    steady.offers[2].foreseen = foreseen;
+    steady.offers[2].follows_prediction = follows;
     steady.play(50, 100, 1e6, 10, 200);
     EXPECT_EQ(steady.policy.incumbent(), 2u);
     steady.play(100, 100, 1e6, 150, 500);
@@ -356,7 +356,7 @@ TEST(ChoicePolicy, AJoinReturnsWhenItsPredictionFalls) {
     steady.offers[2].expected = 20;
     steady.offers[2].hoped = 10;
     steady.play(100, 100, 1e6, 10, 200);
-    frames_of_join[foreseen] = steady.answered[2] - before;
+    frames_of_join[follows] = steady.answered[2] - before;
   }
   EXPECT_GT(frames_of_join[1], 80);
   EXPECT_LT(frames_of_join[0], 40) << "without it, the count of a dear segment keeps it away";

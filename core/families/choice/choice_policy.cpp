@@ -33,7 +33,7 @@ double ChoicePolicy::estimate(std::size_t candidate) const {
                ratio = contacts_ / one.contacts;
   // With fewer contacts, the search becomes less of a work, but does not vanish.
   double rest = std::max(ratio, (1 + ratio) / 2);
-  if (offer.foreseen && last_ == refit && one.predicted > 0)
+  if (offer.follows_prediction && last_ == refit && one.predicted > 0)
     rest = std::min(rest, std::max(0.0, offer.expected - offer.fixed) / one.predicted);
   return fixed + (work - fixed) * rest;
 }

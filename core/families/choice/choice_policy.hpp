@@ -10,13 +10,13 @@ namespace kbvh {
 
 /// What is known about a candidate before a frame. Work is in nanoseconds computed from counts.
 struct Offer {
-  double expected = 0;    ///< predicted work per frame, where no count is known
-  double hoped = 0;       ///< the same at best; at most `expected`
-  double fixed = 0;       ///< part of the work per frame that contacts do not change
-  double change = 0;      ///< what a change to it costs; 0 if it goes on from where it was
-  int frames = 1;         ///< frames that a unit would answer from this frame on; 0: it cannot begin now
-  int whole = 1;          ///< frames of a whole unit
-  bool foreseen = false;  ///< its estimate falls with `expected` while the refit answers
+  double expected = 0;  ///< predicted work per frame, where no count is known
+  double hoped = 0;     ///< the same at best; at most `expected`
+  double fixed = 0;     ///< part of the work per frame that contacts do not change
+  double change = 0;    ///< what a change to it costs; 0 if it goes on from where it was
+  int frames = 1;       ///< frames that a unit would answer from this frame on; 0: it cannot begin now
+  int whole = 1;        ///< frames of a whole unit
+  bool follows_prediction = false;  ///< its estimate falls with `expected` while the refit answers
 };
 
 /// The state of a choice.
