@@ -23,7 +23,7 @@ def make(folder: Path, out: Path) -> claims.Claims:
     if len(commits) != 1:
         raise ResultError(f"{folder} has results of {len(commits)} commits: a reference has one.")
     out.mkdir(parents=True, exist_ok=True)
-    files.write_whole(out / (FILE_NAME + ".gz"), keep.packed(folder / FILE_NAME))
+    files.write_whole(out / (FILE_NAME + ".xz"), keep.packed(folder / FILE_NAME))
     (out / FILE_NAME).unlink(missing_ok=True)  # it would hide the packed one
     theory = folder / "theory.json"
     if theory.exists() and folder.resolve() != out.resolve():

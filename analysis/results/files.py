@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import errno
-import gzip
 import json
+import lzma
 import os
 import sys
-import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Union
@@ -36,13 +35,13 @@ def read_json(file: Path) -> Any:
 
 
 def read_packed(file: Path) -> bytes:
-    """Returns the content of a file, or that of `file`.gz if only this exists. Raises OSError."""
-    packed = file.with_name(file.name + ".gz")
+    """Returns the content of a file, or that of `file`.xz if only this exists. Raises OSError."""
+    packed = file.with_name(file.name + ".xz")
     if file.exists() or not packed.exists():
         return file.read_bytes()
     try:
-        return gzip.decompress(packed.read_bytes())
-    except (EOFError, zlib.error) as problem:
+        return lzma.decompress(packed.read_bytes())
+    except lzma.LZMAError as problem:
         raise OSError(errno.EIO, f"it is damaged ({problem})", str(packed)) from problem
 
 

@@ -6,8 +6,8 @@ gives the same bytes.
 
 from __future__ import annotations
 
-import gzip
 import json
+import lzma
 from pathlib import Path
 from typing import Any
 
@@ -36,4 +36,4 @@ def packed(file: Path) -> bytes:
         except ValueError as problem:
             raise files.ResultError(f"{file} line {number}: {problem}.") from None
         lines.append(json.dumps(rounded(record), separators=(",", ":"), ensure_ascii=False) + "\n")
-    return gzip.compress("".join(lines).encode("utf-8"), compresslevel=9, mtime=0)
+    return lzma.compress("".join(lines).encode("utf-8"))

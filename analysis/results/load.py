@@ -81,7 +81,7 @@ ONE_OF_EACH_COMMIT = (*ONE_OF_ALL_COMMITS, "commit", "dirty")
 
 
 def load(folder: Path, newest_of: tuple[str, ...] = ONE_OF_ALL_COMMITS) -> Study:
-    """Reads `folder`/results.jsonl, or results.jsonl.gz; of runs that agree in the columns `newest_of`, the newest. Raises ResultError."""
+    """Reads `folder`/results.jsonl, or results.jsonl.xz; of runs that agree in the columns `newest_of`, the newest. Raises ResultError."""
     path = folder / FILE_NAME
     try:
         lines = files.read_packed(path).decode("utf-8", errors="replace").split("\n")

@@ -39,7 +39,7 @@ int report(const std::string& script, const std::string& out, const std::string&
   const std::filesystem::path results = std::filesystem::path(out) / "results.jsonl";
   std::error_code error;
   if (!std::filesystem::is_regular_file(results, error) &&
-      !std::filesystem::is_regular_file(results.string() + ".gz", error))
+      !std::filesystem::is_regular_file(results.string() + ".xz", error))
     throw io::InputError("there is no " + results.string() + " (`kbvh run --out " + out + "` makes it)");
   std::vector<std::string> words{python(), (analysis_folder() / script).string(), out};
   if (!title.empty()) words.insert(words.end(), {"--title", title});

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import gzip
 import json
+import lzma
 import subprocess
 import sys
 import tempfile
@@ -39,7 +39,7 @@ class TestKeeping(unittest.TestCase):
     def test_what_is_kept_differs_in_the_fourth_digit_of_frames_only(self) -> None:
         content = keep.packed(self.folder / "results.jsonl")
         self.assertEqual(content, keep.packed(self.folder / "results.jsonl"), "the same bytes at any time")
-        kept = [json.loads(line) for line in gzip.decompress(content).decode().splitlines()]
+        kept = [json.loads(line) for line in lzma.decompress(content).decode().splitlines()]
         given = [json.loads(line) for line in (self.folder / "results.jsonl").read_text().splitlines()]
         self.assertEqual(len(kept), len(given))
         frames = 0
@@ -55,8 +55,8 @@ class TestKeeping(unittest.TestCase):
 
     def test_packed_results_are_read_where_there_are_no_others(self) -> None:
         whole = load(self.folder)
-        packed = self.folder / "results.jsonl.gz"
-        packed.write_bytes(gzip.compress((self.folder / "results.jsonl").read_bytes()))
+        packed = self.folder / "results.jsonl.xz"
+        packed.write_bytes(lzma.compress((self.folder / "results.jsonl").read_bytes()))
         (self.folder / "results.jsonl").unlink()
         self.assertTrue(load(self.folder).runs.equals(whole.runs))
         packed.write_bytes(packed.read_bytes()[:-20])
@@ -69,7 +69,7 @@ class TestKeeping(unittest.TestCase):
     def test_a_reference_is_of_one_commit_and_its_verdicts_are_of_what_is_kept(self) -> None:
         out = self.place / "reference"
         found = reference.make(self.folder, out)
-        self.assertEqual(sorted(one.name for one in out.iterdir()), ["claims.json", "results.jsonl.gz"])
+        self.assertEqual(sorted(one.name for one in out.iterdir()), ["claims.json", "results.jsonl.xz"])
         self.assertEqual({row.id: row.verdict for row in found.rows}, agree.verdicts(out))
         lines = (self.folder / "results.jsonl").read_text().splitlines()
         (self.folder / "results.jsonl").write_text("\n".join([*lines, lines[0].replace(json.loads(lines[0])["commit"], "f" * 12)]) + "\n")

@@ -19,7 +19,7 @@ function origin(files) {
 
 /// Returns {numbers: key => {value, source}, data: traces for pictures}. `cache` is a file for the results.
 export function makeNumbers({ walker, kbvh, cache }) {
-  const made_by = origin([walker, kbvh, ...["theory.json", "results.jsonl.gz", "claims.json"].map((name) => join(dirname(root), "reference", name))]);
+  const made_by = origin([walker, kbvh, ...["theory.json", "results.jsonl.xz", "claims.json"].map((name) => join(dirname(root), "reference", name))]);
   if (cache && existsSync(cache)) {
     const kept = JSON.parse(readFileSync(cache, "utf8"));
     if (kept.made_by === made_by) return kept;
