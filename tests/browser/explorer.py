@@ -171,6 +171,10 @@ def merged(place: Path, program: str) -> dict[str, Any]:
                         synthetic.add_frames(line, seed)
                     lines.append(line)
         synthetic.write(place / name, lines)
+    few = [json.loads(line) for line in (place / "one" / "results.jsonl").read_text().splitlines()]
+    for record in few:
+        record["times"]["repetitions"] = record["times"]["repetitions"][:3]
+    synthetic.write(place / "few", few)
     folder = place / "merged"
     subprocess.run([program, "merge", *(place / name for name, *_ in sources), "--out", folder], check=True, stdout=subprocess.DEVNULL)
     study = write(folder)
@@ -184,6 +188,7 @@ def merged(place: Path, program: str) -> dict[str, Any]:
         found = ratios.ratio(study, int(row.run_b), int(row.run_a), "with_motion")
         expected["versus"].append(described(found))
     expected["one"] = {"results": str(place / "one" / "results.jsonl"), "scene": "<b>&\"scene\"", "runs": 54}
+    expected["few"] = {"results": str(place / "few" / "results.jsonl")}
     expected["records"] = sum(1 for _ in (folder / "results.jsonl").open())
     return expected
 

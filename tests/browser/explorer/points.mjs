@@ -1,7 +1,9 @@
 // Files that are opened in the page, and points that lead to commands.
 import assert from "node:assert/strict";
 import { spawnSync } from "node:child_process";
-import { readFileSync } from "node:fs";
+import { mkdtempSync, readFileSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
 
 import { check, drawn, expected, leave, load, open } from "../support/explorer.mjs";
 
@@ -120,15 +122,14 @@ await check("the program accepts the commands", async () => {
     return [...new Set(one.values())];
   });
   assert.ok(commands.length > 15);
+  const folder = mkdtempSync(join(tmpdir(), "kbvh-again-"));
   for (const text of commands) {
-    const line = text
-      .split("\n")
-      .at(-1)
-      .replace(/^kbvh/, `'${process.env.KBVH_PROGRAM}'`)
-      .replace("--out again", "--print-plan");
-    const told = spawnSync("sh", ["-c", line], { encoding: "utf8" });
-    assert.equal(told.status, 0, `${line}: ${told.stderr}`);
+    if (text.includes('"data:')) continue; // of files that need not be here
+    const lines = text.replace(/^kbvh/m, `'${process.env.KBVH_PROGRAM}'`).replace("--out again", "--print-plan");
+    const told = spawnSync("sh", ["-c", lines], { encoding: "utf8", cwd: folder });
+    assert.equal(told.status, 0, `${lines}: ${told.stderr}`);
   }
+  rmSync(folder, { recursive: true });
   leave(page);
   const shapes = await open("merged");
   const text = await shapes.evaluate(() => window.explorer.command(window.explorer.model.runs[0]).text);

@@ -130,7 +130,7 @@ function one({ model, state, choose }, error, runs, looks) {
     notes: times.outside ? [`${plural(times.outside, "point")} beyond the axis of time: arrows at its edge.`] : [],
     plot: (width) => ({
       height: 330,
-      marginLeft: 60,
+      marginLeft: 68,
       marginBottom: 44,
       marginRight: 24,
       x: logScale(times, width - 90, `${measure.name}${measure.unit === "ms" ? ", ms per frame" : ""} →`, { grid: true }),
