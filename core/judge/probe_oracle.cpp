@@ -1,6 +1,7 @@
 #include "core/judge/probe_oracle.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <limits>
 #include <string>
@@ -143,6 +144,8 @@ void ProbeCheck::add(const ProbeCheck& other) {
   missed += other.missed;
   extra += other.extra;
   misplaced += other.misplaced;
+  rounded += other.rounded;
+  parameter_error = std::max(parameter_error, other.parameter_error);
   if (first_violation.empty()) first_violation = other.first_violation;
 }
 
@@ -162,11 +165,15 @@ ProbeCheck compare_hits(const Scene<S>& scene, const Playback<S>& playback, RayQ
   check.probes = rays.size();
   for (std::size_t i = 0; i < rays.size(); ++i) {
     check.hits += truth[i] ? 1 : 0;
-    const bool same = query == RayQuery::closest || !found[i] || !truth[i]
-                          ? found[i] == truth[i]
-                          : alone(scene, playback, rays[i], found[i]) == found[i];
-    if (same) continue;
-    ++(!found[i] ? check.missed : !truth[i] ? check.extra : check.misplaced);
+    const RayHit right = query == RayQuery::closest || !found[i] || !truth[i]
+                             ? truth[i]
+                             : alone(scene, playback, rays[i], found[i]);
+    if (found[i] == right) continue;
+    const bool rounded = found[i] && found[i].body == right.body && found[i].primitive == right.primitive;
+    ++(!found[i] ? check.missed : !truth[i] ? check.extra : rounded ? check.rounded : check.misplaced);
+    if (rounded && right.parameter != 0)
+      check.parameter_error = std::max(
+          check.parameter_error, std::abs(found[i].parameter - right.parameter) / std::abs(right.parameter));
     if (check.first_violation.empty())
       check.first_violation =
           "ray " + std::to_string(i) + ": " + text(found[i]) + " instead of " + text(truth[i]);

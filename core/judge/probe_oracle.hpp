@@ -18,16 +18,20 @@ void brute_force_hits(const Scene<S>& scene, Playback<S>& playback, RayQuery que
 
 /// The comparison of answers to rays or balls with the truth.
 struct ProbeCheck {
-  std::uint64_t probes = 0;     ///< rays or balls that were compared
-  std::uint64_t hits = 0;       ///< rays that truly meet something; primitives within balls
-  std::uint64_t missed = 0;     ///< of these, reported as misses
-  std::uint64_t extra = 0;      ///< reported as hits, and are none
-  std::uint64_t misplaced = 0;  ///< hits of another primitive, or at another parameter, than the truth
-  std::string first_violation;  ///< the first of these: ray, answer and truth; or empty
+  std::uint64_t probes = 0;  ///< rays or balls that were compared
+  std::uint64_t hits = 0;    ///< rays that truly meet something; primitives within balls
+  std::uint64_t missed = 0;  ///< of these, reported as misses
+  std::uint64_t extra = 0;   ///< reported as hits, and are none
+  std::uint64_t misplaced =
+      0;  ///< hits of another primitive than the truth, or, for any hit, of one that is not met
+  std::uint64_t rounded = 0;  ///< hits of the true primitive at another parameter
+  double parameter_error =
+      0;  ///< of these: the largest difference of parameters, over the true one if that is not 0
+  std::string first_violation;  ///< the first wrong answer: ray, answer and truth; or empty
 
   void add(const ProbeCheck& other);
   /// Returns whether all answers are exact.
-  bool holds() const { return missed + extra + misplaced == 0; }
+  bool holds() const { return missed + extra + misplaced + rounded == 0; }
 };
 
 /// Compares answers at the playback's current time with the closest hits `truth`. Closest hits must be equal;

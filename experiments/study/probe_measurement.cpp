@@ -42,7 +42,10 @@ void ProbeMeasurement<S>::verify(ProbeEntrant<S>& entrant, std::uint64_t oracle_
   measured.verification.candidates = check.hits;
   measured.verification.missed = check.missed;
   measured.verification.extra = check.extra + check.misplaced;
-  if (is_exact(session.info())) measured.verification.first_violation = check.first_violation;
+  if (is_exact(session.info())) {
+    measured.verification.extra += check.rounded;
+    measured.verification.first_violation = check.first_violation;
+  }
 }
 
 template <class S>
@@ -86,6 +89,8 @@ nlohmann::json ProbeMeasurement<S>::extras(std::size_t i) const {
             {"missed", entrant.check.missed},
             {"extra", entrant.check.extra},
             {"misplaced", entrant.check.misplaced},
+            {"rounded", entrant.check.rounded},
+            {"parameter_error", entrant.check.parameter_error},
             {"hidden_bodies", entrant.hidden_bodies}}}};
 }
 

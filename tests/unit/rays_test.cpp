@@ -19,6 +19,8 @@
 #include <vector>
 
 #include "core/geometry/ray_box.hpp"
+#include "core/judge/probe_oracle.hpp"
+#include "core/scene/playback.hpp"
 #include "core/scene/scene.hpp"
 #include "tests/support/rational_geometry.hpp"
 
@@ -386,6 +388,37 @@ TEST(RaySearch, AnswersDoNotDependOnTheOrder) {
   }
   EXPECT_GT(hits, 200U);
   EXPECT_GT(ties, 300U);
+}
+
+/// A parameter that a peer rounds is not a hit of another primitive: the two are counted apart.
+TEST(ProbeCheck, TellsAnotherPrimitiveFromAnotherParameter) {
+  const Scene<float> scene = flat_grid(1, 1, 1);
+  Playback<float> playback(scene);
+  playback.evaluate_all();
+  const std::vector<Ray<float>> rays{{{0.05F, 0.05F, -0.9F}, {0, 0, 1}}, {{5, 5, 0}, {0, 0, 1}}};
+  std::vector<RayHit> truth(2);
+  brute_force_hits<float>(scene, playback, RayQuery::closest, rays, std::span<RayHit>(truth));
+  ASSERT_EQ(truth[0].primitive, 0U);
+  ASSERT_FALSE(truth[1]);
+  const auto checked = [&](RayQuery query, const RayHit& first, const RayHit& second) {
+    return compare_hits<float>(scene, playback, query, rays, std::vector{first, second}, truth);
+  };
+  RayHit later = truth[0], other = truth[0];
+  later.parameter *= 1 + 0x1p-20;
+  other.primitive = 1;
+  for (const RayQuery query : {RayQuery::closest, RayQuery::any}) {
+    EXPECT_TRUE(checked(query, truth[0], {}).holds());
+    const ProbeCheck rounded = checked(query, later, {});
+    EXPECT_EQ(std::tuple(rounded.missed, rounded.extra, rounded.misplaced, rounded.rounded),
+              std::tuple(0U, 0U, 0U, 1U));
+    EXPECT_NEAR(rounded.parameter_error, 0x1p-20, 0x1p-50);
+    EXPECT_FALSE(rounded.holds());
+    const ProbeCheck misplaced = checked(query, other, {});
+    EXPECT_EQ(std::tuple(misplaced.misplaced, misplaced.rounded), std::tuple(1U, 0U));
+    EXPECT_EQ(misplaced.parameter_error, 0);
+    const ProbeCheck both = checked(query, {}, truth[0]);
+    EXPECT_EQ(std::tuple(both.missed, both.extra, both.misplaced, both.rounded), std::tuple(1U, 1U, 0U, 0U));
+  }
 }
 
 TEST(CheckRays, NamesTheRayAndTheValue) {
