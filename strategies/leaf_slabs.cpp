@@ -7,9 +7,9 @@
 // costs two thirds as much as the boxes of a leaf's triangles. Needs no foresight; bodies that are not made
 // of triangles are queried by boxes. It is a declared baseline: it refits, and knows nothing of the future.
 //
-// When it wins: with exact tests. By plan `motion` (a0efb8c, AMD EPYC, float, l = 1) it is 0.99 to 2.6 times
-// as fast as the best refit by boxes alone: most on a dancer's skirt and a recorded tablecloth, least on a
-// morph stress test, whose leaves are rough.
+// When it wins: with exact tests. By plan `motion` (float, l = 1) it is 0.99 to 2.6 times (a0efb8c, AMD EPYC)
+// and 0.88 to 2.2 times (b9393a5, Intel Xeon) as fast as the best refit by boxes alone: most on a dancer's
+// skirt and a recorded tablecloth, least on a morph stress test, whose leaves are rough.
 #include "core/contract/registry.hpp"
 #include "core/families/slabs/slab_strategy.hpp"
 
