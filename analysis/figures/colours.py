@@ -112,7 +112,7 @@ def looks(contestants: Iterable[tuple[str, str, str]]) -> dict[str, Look]:
     """Returns looks by contestant, from (contestant, strategy id, family).
 
     Strategies of a family take shades and line styles in the order of their ids; configurations of one strategy share its
-    colour and differ by line style.
+    colour. All that share a colour, up to ten, differ by line style or by whether the marker is filled.
     """
     listed = list(contestants)
     by_family = families([family for _, _, family in listed])
@@ -125,16 +125,20 @@ def looks(contestants: Iterable[tuple[str, str, str]]) -> dict[str, Look]:
         configurations = variants.setdefault(strategy, [])
         if contestant not in configurations:
             configurations.append(contestant)
+    steps: dict[str, int] = {}
+    for ids in members.values():
+        for shade in range(len(SHADES)):
+            sharing = [one for strategy in ids[shade :: len(SHADES)] for one in variants[strategy]]
+            steps.update({one: shade + rank for rank, one in enumerate(sharing)})
     result: dict[str, Look] = {}
     for contestant, strategy, family in listed:
         colour, marker = by_family[family]
         member = members[family].index(strategy)
-        variant = variants[strategy].index(contestant)
         result[contestant] = Look(
             colour=mix(colour, SHADES[member % len(SHADES)]),
             marker=marker,
-            line=LINE_STYLES[(member + variant) % len(LINE_STYLES)],
-            filled=(member + variant) % 2 == 0,
+            line=LINE_STYLES[steps[contestant] % len(LINE_STYLES)],
+            filled=steps[contestant] % 2 == 0,
             dark=shaded_on_dark(colour, SHADES[member % len(SHADES)]),
         )
     return result

@@ -39,6 +39,15 @@ class TestLooks(unittest.TestCase):
         self.assertEqual(looks["a1"].colour, looks["a2"].colour)
         self.assertEqual({look.marker for look in looks.values()}, {"o"})
 
+    def test_more_members_than_shades_differ(self) -> None:
+        looks = colours.looks((f"{member} {one}", f"{member}", "kinetic") for member in range(10) for one in range(4 + member % 3))
+        shared: dict[str, list[tuple[str, bool]]] = {}
+        for look in looks.values():
+            shared.setdefault(look.colour, []).append((str(look.line), look.filled))
+        self.assertEqual(len(shared), len(colours.SHADES))
+        for styles in shared.values():
+            self.assertEqual(len(set(styles)), min(len(styles), 10))
+
     def test_every_marker_can_be_drawn(self) -> None:
         figure = Figure()
         axes = figure.subplots()

@@ -53,11 +53,18 @@ export function looks(rows, palette) {
     push(members, row.family, row.strategy.id);
     push(variants, row.strategy.id, row.contestant);
   }
+  // All that share a shade, up to ten, differ by dashes or by whether the marker is filled.
+  const steps = new Map();
+  for (const ids of members.values())
+    for (let shade = 0; shade < palette.shades.length; ++shade) {
+      const sharing = ids.filter((_, member) => member % palette.shades.length === shade).flatMap((id) => variants.get(id));
+      sharing.forEach((contestant, rank) => steps.set(contestant, shade + rank));
+    }
   return new Map(
     unique.map((row) => {
       const [colour, marker] = of(row.family);
       const member = members.get(row.family).indexOf(row.strategy.id);
-      const variant = variants.get(row.strategy.id).indexOf(row.contestant);
+      const step = steps.get(row.contestant);
       const shade = palette.shades[member % palette.shades.length];
       return [
         row.contestant,
@@ -65,8 +72,8 @@ export function looks(rows, palette) {
           light: mix(colour, shade),
           dark: onDark(mix(onDark(colour, palette.dark, palette.family_contrast), -shade), palette.dark, palette.contrast),
           corners: palette.corners[marker] ?? [],
-          dashes: palette.dashes[(member + variant) % palette.dashes.length],
-          filled: (member + variant) % 2 === 0,
+          dashes: palette.dashes[step % palette.dashes.length],
+          filled: step % 2 === 0,
         },
       ];
     }),
