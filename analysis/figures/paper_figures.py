@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from claims.claim_points import Table
 from figures.axes import KeyLines, fixed_log_axis, key, key_size, log_axis
 from figures.canvas import Picture, picture
-from figures.colours import FAMILIES, Look
+from figures.colours import FAMILIES, Look, looks as looks_of
 from figures.figures import WIDTH
 from results import text
 
@@ -30,6 +30,8 @@ PEERS: list[tuple[str, dict[str, Any]]] = [
     ("FCL, bottom-up refit", {"strategy": "fcl_float_bottom_up"}),
     ("Bullet, BVH refit", {"strategy": "bullet_bvh"}),
 ]
+#: Colours that differ: among all contestants of a report two of these structures may share one.
+LOOKS: dict[str, Look] = looks_of((name, name, "kinetic") for name, _ in KINETIC + LIST)
 
 
 @dataclass(frozen=True)
@@ -197,7 +199,8 @@ def lines_of(
                     y.append(float(np.median(known)))
                     last = table.row(run)
             if last is not None:
-                look = Look(*FAMILIES["refit"], "-", True) if "baseline" in term or "family" in term else looks[last["contestant"]]
+                own = LOOKS.get(name) or looks[last["contestant"]]
+                look = Look(*FAMILIES["refit"], "-", True) if "baseline" in term or "family" in term else own
                 look = replace(look, filled=True)  # open markers are for the second quantity here
                 result.append(Line(name, look, quantity, x, y, number > 0))
     if panel.x == "l":
