@@ -2,13 +2,14 @@
 
 usage: worst_frames.py RESULTS_DIR [--write PAGE]...
 The page has the table between `<!-- worst frames -->` and `<!-- /worst frames -->`. A row is a table of results in which the join
-made ahead takes part. A worst frame is the median over repetitions of each repetition's longest frame, in ms, positions included:
+made ahead takes part, with contestants of the same study: another one may have measured the same join at another time. A worst frame is the median over repetitions of each repetition's longest frame, in ms, positions included:
 "later" leaves out frame 0, which holds `reset` and the first query.
 """
 
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import Optional
 
@@ -18,10 +19,16 @@ import pandas as pd
 from report import headline
 from report.headline import Case, Contestant
 from results import files, text
-from results.load import ResultError, load
+from results.load import ONE_OF_EACH_STUDY, ResultError, Study, load
 
 AHEAD = Contestant("join made ahead", "interval_join_ahead")
 BEGIN, END = "<!-- worst frames -->", "<!-- /worst frames -->"
+
+
+def timed_with_ahead(study: Study) -> Study:
+    """Keeps, of each group, the runs of the study that has the newest run of the join made ahead."""
+    wanted = study.runs[study.runs["id"] == AHEAD.id].drop_duplicates("group", keep="last").set_index("group")["study"]
+    return study if wanted.empty else replace(study, runs=study.runs[study.runs["study"] == study.runs["group"].map(wanted)])
 
 
 def worst(case: Case, run: pd.Series) -> tuple[float, float]:
@@ -62,7 +69,7 @@ def main(arguments: Optional[list[str]] = None) -> int:
     options = parser.parse_args(arguments)
 
     def work() -> int:
-        rows = table(headline.cases(load(options.folder)))
+        rows = table(headline.cases(timed_with_ahead(load(options.folder, ONE_OF_EACH_STUDY))))
         pages = {page: files.inserted(page.read_text(encoding="utf-8"), BEGIN, END, rows, str(page)) for page in options.write}
         for page, content in pages.items():
             files.write_whole(page, content)

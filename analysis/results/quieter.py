@@ -1,8 +1,8 @@
 """Of several runs of one plan by one commit, the quieter one of each table.
 
 A machine that is shared is quiet for a while. Played twice, a plan has tables in which fewer contestants were disturbed. Each scene, l,
-scalar, order and question is taken as a whole from the run with the most contestants and, of these, the fewest disturbed ones; of
-equal ones, from the first. Nothing is chosen by a time.
+scalar, order and question of each study is taken as a whole from the run with the most contestants and, of these, the fewest disturbed
+ones; of equal ones, from the first. Nothing is chosen by a time.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from results import files
-from results.load import FILE_NAME, ResultError, load
+from results.load import FILE_NAME, ONE_OF_EACH_STUDY, ResultError, load
 
 
 @dataclass(frozen=True)
@@ -25,9 +25,9 @@ class Table:
 
 def tables(folder: Path) -> tuple[set[str], dict[tuple[str, ...], Table]]:
     """Returns the commits of a folder of results, and its tables. Raises ResultError."""
-    study = load(folder)
+    study = load(folder, ONE_OF_EACH_STUDY)
     lines = files.read_packed(folder / FILE_NAME).decode("utf-8").split("\n")
-    asks = ["scene_name", "hash", "scalar", "l", "frames", "answer", "rays", "within", "held_to"]
+    asks = ["scene_name", "hash", "scalar", "l", "frames", "answer", "rays", "within", "held_to", "study"]
     found = {}
     for asked, rows in study.runs.groupby(asks, sort=False, dropna=False):
         key = tuple(map(str, asked))  # what is not known is equal, too
@@ -47,7 +47,8 @@ def quieter(folders: list[Path]) -> tuple[list[str], list[str]]:
         folder, table = min(of, key=lambda one: (-len(one[1].lines), one[1].disturbed))
         lines += table.lines
         counts = ", ".join(f"{one.disturbed} of {len(one.lines)} disturbed in {place}" for place, one in of)
-        said.append(f"{key[0]}, l = {float(key[3]):g}: {counts}: {folder}")
+        study = f"{key[-1]}: " if key[-1] else ""
+        said.append(f"{study}{key[0]}, l = {float(key[3]):g}: {counts}: {folder}")
     return lines, said
 
 

@@ -57,6 +57,7 @@ def row_of(record: Record, index: int) -> dict[str, Any]:
         "schema": int(record.number("schema")),
         "key": str(record.get("key", "")),
         "session": str(record.get("run", "")),
+        "study": str(record.get("study", "")),
         "kind": record.text("kind"),
         "when": _time(record.text("when", "")),
         "commit": record.text("commit", ""),

@@ -47,6 +47,13 @@ class TestQuieter(unittest.TestCase):
         second = self.folder("second", line("a", 1, "two", "9 switches"), line("b", 1, "two", "9 switches"))
         self.assertEqual(set(self.sessions(first, second).values()), {"two"})
 
+    def test_studies_that_ask_the_same_of_one_contestant_are_tables_of_their_own(self) -> None:
+        first = self.folder("first", line("a", 1, "one", "9 switches", study="x"), line("a", 1, "one", study="y"), line("b", 1, "one", study="y"))
+        second = self.folder("second", line("a", 1, "two", study="x"))
+        lines, _ = quieter.quieter([first, second])
+        records = [synthetic.json.loads(one) for one in lines]
+        self.assertEqual([(one["study"], one["strategy"]["id"], one["run"]) for one in records], [("x", "a", "two"), ("y", "a", "one"), ("y", "b", "one")])
+
     def test_commits_are_not_mixed_and_results_not_overwritten(self) -> None:
         first, second = self.folder("first", line("a", 1, "one")), self.folder("second", line("a", 1, "two", commit="f" * 12))
         with self.assertRaisesRegex(ResultError, "one commit"):

@@ -40,6 +40,13 @@ class TestWorstFrames(unittest.TestCase):
         self.assertEqual(cells[:2], ["a scene", "10"])
         self.assertEqual([cell.split()[0] for cell in cells[2:]], ["7.00", "–", "10.0", "2.50"])
 
+    def test_a_join_that_another_study_measured_later_does_not_stand_beside_the_one_made_ahead(self) -> None:
+        records = [framed(id, [[3.0, 1.0]] * 3) for id in ("leaf_slabs", "interval_join", "interval_join_ahead")]
+        later = {**framed("interval_join", [[8.0, 1.0]] * 3), "study": "another"}
+        code, out, _ = self.run_main([*records, later])
+        self.assertEqual(code, 0)
+        self.assertEqual([cell.strip() for cell in out.split("\n")[2].strip("|").split("|")][2:], ["4.00", "4.00", "4.00", "2.00"])
+
     def test_results_without_the_join_made_ahead_are_refused_with_a_sentence(self) -> None:
         code, _, err = self.run_main([framed("leaf_slabs", [[1.0, 1.0]] * 3)])
         self.assertEqual(code, 2)
