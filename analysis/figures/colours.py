@@ -111,8 +111,8 @@ def mix(colour: str, shade: float) -> str:
 def looks(contestants: Iterable[tuple[str, str, str]]) -> dict[str, Look]:
     """Returns looks by contestant, from (contestant, strategy id, family).
 
-    Strategies of a family take shades and line styles in the order of their ids; configurations of one strategy share its
-    colour. All that share a colour, up to ten, differ by line style or by whether the marker is filled.
+    Strategies of a family take, in the order of their ids, the shade that fewest contestants have so far; configurations of
+    one strategy share its colour. All that share a colour, up to ten, differ by line style or by whether the marker is filled.
     """
     listed = list(contestants)
     by_family = families([family for _, _, family in listed])
@@ -125,21 +125,23 @@ def looks(contestants: Iterable[tuple[str, str, str]]) -> dict[str, Look]:
         configurations = variants.setdefault(strategy, [])
         if contestant not in configurations:
             configurations.append(contestant)
+    shades: dict[str, int] = {}
     steps: dict[str, int] = {}
     for ids in members.values():
-        for shade in range(len(SHADES)):
-            sharing = [one for strategy in ids[shade :: len(SHADES)] for one in variants[strategy]]
-            steps.update({one: shade + rank for rank, one in enumerate(sharing)})
+        sharing = [0] * len(SHADES)
+        for strategy in ids:
+            shade = shades[strategy] = sharing.index(min(sharing))
+            steps.update({one: shade + sharing[shade] + rank for rank, one in enumerate(variants[strategy])})
+            sharing[shade] += len(variants[strategy])
     result: dict[str, Look] = {}
     for contestant, strategy, family in listed:
         colour, marker = by_family[family]
-        member = members[family].index(strategy)
         result[contestant] = Look(
-            colour=mix(colour, SHADES[member % len(SHADES)]),
+            colour=mix(colour, SHADES[shades[strategy]]),
             marker=marker,
             line=LINE_STYLES[steps[contestant] % len(LINE_STYLES)],
             filled=steps[contestant] % 2 == 0,
-            dark=shaded_on_dark(colour, SHADES[member % len(SHADES)]),
+            dark=shaded_on_dark(colour, SHADES[shades[strategy]]),
         )
     return result
 

@@ -48,6 +48,12 @@ class TestLooks(unittest.TestCase):
         for styles in shared.values():
             self.assertEqual(len(set(styles)), min(len(styles), 10))
 
+    def test_a_strategy_of_many_configurations_has_its_shade_alone(self) -> None:
+        many = [(f"many {one}", "many", "refit") for one in range(12)]
+        looks = colours.looks([*many, *((f"z{one}", f"z{one}", "refit") for one in range(8))])
+        self.assertNotIn(looks["many 0"].colour, {looks[f"z{one}"].colour for one in range(8)})
+        self.assertEqual(len({(look.colour, str(look.line), look.filled) for look in looks.values()}), 18)
+
     def test_every_marker_can_be_drawn(self) -> None:
         figure = Figure()
         axes = figure.subplots()

@@ -53,19 +53,22 @@ export function looks(rows, palette) {
     push(members, row.family, row.strategy.id);
     push(variants, row.strategy.id, row.contestant);
   }
-  // All that share a shade, up to ten, differ by dashes or by whether the marker is filled.
+  // A strategy takes the shade that fewest have so far. All that share one, up to ten, differ by dashes or by a filled marker.
+  const shades = new Map();
   const steps = new Map();
-  for (const ids of members.values())
-    for (let shade = 0; shade < palette.shades.length; ++shade) {
-      const sharing = ids.filter((_, member) => member % palette.shades.length === shade).flatMap((id) => variants.get(id));
-      sharing.forEach((contestant, rank) => steps.set(contestant, shade + rank));
+  for (const ids of members.values()) {
+    const sharing = palette.shades.map(() => 0);
+    for (const id of ids) {
+      const shade = sharing.indexOf(Math.min(...sharing));
+      shades.set(id, palette.shades[shade]);
+      for (const contestant of variants.get(id)) steps.set(contestant, shade + sharing[shade]++);
     }
+  }
   return new Map(
     unique.map((row) => {
       const [colour, marker] = of(row.family);
-      const member = members.get(row.family).indexOf(row.strategy.id);
       const step = steps.get(row.contestant);
-      const shade = palette.shades[member % palette.shades.length];
+      const shade = shades.get(row.strategy.id);
       return [
         row.contestant,
         {
