@@ -2,8 +2,9 @@
 
 usage: worst_frames.py RESULTS_DIR [--write PAGE]...
 The page has the table between `<!-- worst frames -->` and `<!-- /worst frames -->`. A row is a table of results in which the join
-made ahead takes part, with contestants of the same study: another one may have measured the same join at another time. A worst frame is the median over repetitions of each repetition's longest frame, in ms, positions included:
-"later" leaves out frame 0, which holds `reset` and the first query.
+made ahead takes part, with contestants of the same study: another one may have measured the same join at another time. A worst
+frame is the median over repetitions of each repetition's longest frame, in ms, positions included: "later" leaves out frame 0,
+which holds `reset` and the first query.
 """
 
 from __future__ import annotations

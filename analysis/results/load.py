@@ -78,7 +78,7 @@ class Study:
 #: Of the runs with equal values in these columns, a report shows the newest.
 ONE_OF_ALL_COMMITS = ("group", "contestant")
 ONE_OF_EACH_COMMIT = (*ONE_OF_ALL_COMMITS, "commit", "dirty")
-ONE_OF_EACH_STUDY = (*ONE_OF_ALL_COMMITS, "study")
+ONE_OF_EACH_STUDY = (*ONE_OF_ALL_COMMITS, "study")  #: of a plan: two studies may ask the same of one contestant
 
 
 def load(folder: Path, newest_of: tuple[str, ...] = ONE_OF_ALL_COMMITS) -> Study:
